@@ -3,6 +3,7 @@
 FROM rust:1-bookworm AS build
 WORKDIR /build
 COPY Cargo.toml Cargo.lock ./
+COPY crates/dicom/Cargo.toml crates/dicom/
 COPY crates/ventriform/Cargo.toml crates/ventriform/
 COPY crates/service/Cargo.toml crates/service/
 COPY crates/store/Cargo.toml crates/store/

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Compares the public interface of the crate `ventriform` with that of the newest release: a change that breaks its
-# users fails unless the version in Cargo.toml says so.
+# Compares the public interfaces of the crates `ventriform` and `ventriform-dicom` with those of the newest release: a
+# change that breaks their users fails unless the version in Cargo.toml says so.
 #
 #   scripts/release/check_semver.sh [REVISION]      the newest tag v* unless given
 #
@@ -21,4 +21,5 @@ tool=$PWD/target/test-tools/semver-$version
 # Without optimisation it compiles in a third of the time, and what takes long here is rustdoc.
 [ -x "$tool/bin/cargo-semver-checks" ] ||
   cargo install --quiet --locked --debug --root "$tool" "cargo-semver-checks@$version"
-"$tool/bin/cargo-semver-checks" semver-checks --package ventriform --baseline-rev "$revision"
+"$tool/bin/cargo-semver-checks" semver-checks --package ventriform --package ventriform-dicom \
+  --baseline-rev "$revision"

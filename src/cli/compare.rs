@@ -17,7 +17,7 @@ use ventriform::parameters::ComparisonChoice;
 use ventriform::results::export::Format;
 use ventriform::results::figures;
 use ventriform::runs::advice::Explain;
-use ventriform::runs::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
+use ventriform::runs::rest_stress::{ComparisonOrder, from_files};
 
 /// Compare rest and stress of one patient: where the wall lacks blood only under stress
 #[derive(Debug, Args)]

@@ -295,6 +295,11 @@ impl<'a> Monitor<'a> {
         }
     }
 
+    /// Whether the work goes on: the token was not raised.
+    pub fn goes_on(&self) -> impl Fn() -> bool {
+        || self.check().is_ok()
+    }
+
     /// The time of the observer's clock in milliseconds.
     pub fn now_ms(&self) -> f64 {
         self.observer.now_ms()

@@ -1,4 +1,4 @@
-//! Text that comes from files and callers: which characters no name has, and how it is printed.
+//! Text that comes from files and callers, printed; and the lists of documents, read.
 //!
 //! A terminal obeys control characters, a log ends its line at others, and controls of writing
 //! direction show a text in an order in which it is not stored (Unicode Technical Report 36, 3.1).
@@ -10,6 +10,9 @@ use serde::{Deserialize, Deserializer};
 use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::marker::PhantomData;
+use ventriform_dicom::text::{escaped_except, is_obeyed};
+
+pub use ventriform_dicom::text::{escaped, is_printable};
 
 /// A list of a document, which is refused at the entry after `MOST`. What entries are parsed to may have many times the
 /// bytes of their text.
@@ -47,19 +50,6 @@ pub fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Whether a name may have `c`: no control character (C0, DEL, C1), separator of lines or paragraphs,
-/// control of writing direction (embedding, override, isolate), mark of byte order, or sign that
-/// stands for something lost.
-pub fn is_printable(c: char) -> bool {
-    !is_obeyed(c) && !matches!(c, '\u{feff}' | '\u{fffd}' | '\u{fffe}' | '\u{ffff}')
-}
-
-/// Whether terminals, logs or the order of writing obey `c` instead of showing it.
-fn is_obeyed(c: char) -> bool {
-    c.is_control()
-        || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-}
-
 /// `true` if `text` is of ASCII's printable characters and line feeds alone, as nearly all lines of a log are.
 /// All bytes are looked at, so that the compiler can look at many at once.
 fn is_plain(text: &str) -> bool {
@@ -67,17 +57,12 @@ fn is_plain(text: &str) -> bool {
     text.bytes().fold(true, |all, b| all & plain(b))
 }
 
-/// `text` on one line, with every character that would be obeyed as `\n`, `\t`, `\u{1b}`, ...
-pub fn escaped(text: &str) -> Cow<'_, str> {
-    escape(text, &[])
-}
-
 /// As [`escaped`], except that line feeds and tabs stay.
 pub fn escaped_lines(text: &str) -> Cow<'_, str> {
     if is_plain(text) {
         return text.into();
     }
-    escape(text, &['\n', '\t'])
+    escaped_except(text, &['\n', '\t'])
 }
 
 /// JSON text with the same characters as `\uXXXX`; line feeds between values stay.
@@ -98,44 +83,13 @@ pub fn escaped_json(text: &str) -> Cow<'_, str> {
     shown.into()
 }
 
-fn escape<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
-    let escapes = |c: char| is_obeyed(c) && !kept.contains(&c);
-    if !text.contains(escapes) {
-        return text.into();
-    }
-    let mut shown = String::with_capacity(text.len() + 16);
-    for c in text.chars() {
-        if escapes(c) {
-            shown.extend(c.escape_default())
-        } else {
-            shown.push(c)
-        }
-    }
-    shown.into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn what_is_obeyed_is_escaped_and_nothing_else() {
-        for c in (0..=0x0010_ffff).filter_map(char::from_u32) {
-            let obeyed = u32::from(c) < 0x20
-                || (0x7f..0xa0).contains(&u32::from(c))
-                || "\u{2028}\u{2029}\u{202a}\u{202b}\u{202c}\u{202d}\u{202e}\u{2066}\u{2067}\u{2068}\u{2069}"
-                    .contains(c);
-            let text = format!("a{c}b");
-            let shown = escaped(&text);
-            assert_eq!(shown == text, !obeyed, "{c:?}");
-            if obeyed {
-                let inner = &shown[1..shown.len() - 1];
-                assert!(inner.starts_with('\\') && inner.is_ascii(), "{inner}");
-                assert!(!is_printable(c));
-            }
-        }
+    fn lines_and_values_stay_apart() {
         assert_eq!(escaped_lines("a\tb\nc\x1b[2J"), "a\tb\nc\\u{1b}[2J");
-        assert_eq!(escaped("a\tb\nc"), "a\\tb\\nc");
         let value = serde_json::json!({"name": "a\u{9b}31m\u{202e}b\u{7f}\u{2028}c\x1b\n"});
         let shown = serde_json::to_string_pretty(&value).unwrap();
         let safe = escaped_json(&shown);

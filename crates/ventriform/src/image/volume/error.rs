@@ -3,6 +3,7 @@
 use crate::base::geometry::frame::VOXEL_MM;
 use crate::base::progress::Cancelled;
 use crate::mesh::files::MeshFileError;
+use ventriform_dicom::read::ReadError;
 
 /// Problems of a file. [`VolumeError::field`] names the field concerned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -222,6 +223,60 @@ pub enum VolumeError {
     /// The caller cancelled the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<ReadError> for VolumeError {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Unsupported { file, format, fix } => Self::Unsupported { file, format, fix },
+            ReadError::NotVolume {
+                file,
+                found,
+                reason,
+                fix,
+            } => Self::NotVolume {
+                file,
+                found,
+                reason,
+                fix,
+            },
+            ReadError::NotSlices {
+                file,
+                image_type,
+                reason,
+                fix,
+            } => Self::NotSlices {
+                file,
+                image_type,
+                reason,
+                fix,
+            },
+            ReadError::Field {
+                file,
+                field,
+                value,
+                reason,
+                byte,
+            } => Self::Field {
+                file,
+                field,
+                value,
+                reason,
+                byte,
+            },
+            ReadError::Truncated {
+                file,
+                needed,
+                found,
+            } => Self::Truncated {
+                file,
+                needed,
+                found,
+            },
+            ReadError::Corrupt { file, byte, reason } => Self::Corrupt { file, byte, reason },
+            ReadError::Stopped => Self::Cancelled(Cancelled),
+        }
+    }
 }
 
 impl VolumeError {

@@ -104,4 +104,4 @@ pub use read::{
 pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;
 pub use summary::summarise;
-pub use values::{is_date, is_uid};
+pub use ventriform_dicom::values::{is_date, is_uid};

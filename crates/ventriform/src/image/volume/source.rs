@@ -13,6 +13,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use ventriform_dicom::read::bytes::Bytes;
 
 /// Packed bytes are read in portions of this size.
 const PORTION_BYTES: usize = 128 * 1024;
@@ -732,6 +733,24 @@ fn target(to: SeekFrom, length: u64, position: u64) -> io::Result<u64> {
 }
 
 /// For parsers that need a reader. Every error becomes [`ErrorKind::Other`].
+impl Bytes for Source {
+    fn file(&self) -> &str {
+        &self.file
+    }
+
+    fn position(&self) -> u64 {
+        self.position
+    }
+
+    fn capacity(&self) -> u64 {
+        Source::capacity(self)
+    }
+
+    fn peek(&mut self, length: usize) -> io::Result<&[u8]> {
+        Source::peek(self, length).map_err(io::Error::other)
+    }
+}
+
 impl Read for Source {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.fill(buffer).map_err(io::Error::other)

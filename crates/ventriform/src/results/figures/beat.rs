@@ -1,7 +1,8 @@
 //! The figures of a beat.
 
-use super::code::{Code, dcm, loinc, own, sct};
+use super::code::own;
 use super::{Figure, Group, Unit, figure};
+use ventriform_dicom::write::code::{Code, dcm, loinc, sct};
 
 /// Share of the end-diastolic volume that is ejected.
 pub(super) const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");

@@ -1,10 +1,11 @@
 //! The figures of a comparison of rest and stress.
 
 use super::beat::EJECTION_FRACTION;
-use super::code::{Code, loinc, own, sct};
+use super::code::own;
 use super::perfusion::{DEFICIT_SCORE, REST_SCORE, SEGMENT_SCORE, STRESS_SCORE};
 use super::segmentation::{DEFECT_EXTENT, MYOCARDIAL_PERFUSION, VOLUME};
 use super::{Figure, Group, Unit, figure};
+use ventriform_dicom::write::code::{Code, loinc, sct};
 
 const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
 const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");

@@ -18,10 +18,10 @@ mod unit;
 pub use crate::image::draw::document::HeadlineFigure;
 pub use unit::Unit;
 
-use self::code::Code;
 use crate::image::draw::text::{number, signed};
 use serde::Serialize;
 use serde_json::{Value, json};
+use ventriform_dicom::write::code::Code;
 
 /// A figure of a report, or of one of its parts.
 #[derive(Debug, Clone, Copy, PartialEq)]

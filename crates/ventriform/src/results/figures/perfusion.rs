@@ -1,8 +1,9 @@
 //! The figures of a scan beside normal limits.
 
-use super::code::{Code, loinc, own};
+use super::code::own;
 use super::segmentation::DEFECT_EXTENT;
 use super::{Figure, Group, Unit, figure};
+use ventriform_dicom::write::code::{Code, loinc};
 
 /// Mean score of the wall against normal limits.
 pub const DEFICIT_SCORE: Code = own("DEFICIT", "Deficit score against normal limits");

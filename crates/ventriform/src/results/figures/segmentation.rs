@@ -1,7 +1,8 @@
 //! The figures of a segmentation.
 
-use super::code::{Code, dcm, own, sct};
+use super::code::own;
 use super::{Figure, Group, Unit, figure};
+use ventriform_dicom::write::code::{Code, dcm, sct};
 
 /// Volume, of whatever the group is about.
 pub const VOLUME: Code = sct("118565006", "Volume");

@@ -1,6 +1,6 @@
 //! Units of figures.
 
-use super::code::{Code, ucum};
+use ventriform_dicom::write::code::{Code, ucum};
 
 /// A unit, as people write it and as UCUM codes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

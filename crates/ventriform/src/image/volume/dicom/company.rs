@@ -8,11 +8,12 @@
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::VolumeFile;
-use super::attributes::Attributes;
-use super::kind::Kind;
-use super::{guarded, scan, syntax};
+use super::stored::{self, StoredDataSet};
 use crate::base::progress::Monitor;
-use crate::image::volume::facts::ByteOrder;
+use ventriform_dicom::Endianness;
+use ventriform_dicom::read::attributes::Attributes;
+use ventriform_dicom::read::kind::Kind;
+use ventriform_dicom::read::scan;
 
 /// Most files that the warnings name.
 const MOST_NAMED: usize = 8;
@@ -78,17 +79,22 @@ fn check_kind(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<(), VolumeError> {
-    match syntax::find(file, limits) {
-        Ok(syntax) => {
-            let mut source = syntax.open(file, limits.unpacked_bytes)?;
-            guarded(file, || scan::check_kind(&mut source, &syntax, monitor))
+    match StoredDataSet::find(file, limits) {
+        Ok(found) => {
+            let mut source = found.open(file, limits.unpacked_bytes)?;
+            Ok(scan::check_kind(
+                &mut source,
+                &found.syntax,
+                &monitor.goes_on(),
+            )?)
         }
         // A film is in a transfer syntax that is not read, and says what it is all the same.
-        Err(error) => match syntax::media_class(file, limits)? {
+        Err(error) => match stored::media_class(file, limits)? {
             Some(class) => {
-                let mut attributes = Attributes::new(file.name(), ByteOrder::Little);
+                let mut attributes = Attributes::new(file.name(), Endianness::Little);
                 attributes.media_class = Some(class);
-                Kind::from_attributes(&attributes).map(|_| ())
+                Kind::from_attributes(&attributes)?;
+                Ok(())
             }
             None => Err(error),
         },

@@ -1,7 +1,7 @@
 //! The segments of a Segmentation (Segment Sequence, PS3.3 C.8.20.4).
 
 use super::super::{Segment, SegmentCode};
-use super::attributes::{
+use ventriform_dicom::read::attributes::{
     Attributes, SEGMENT_LABEL, SEGMENT_NUMBER, SEGMENT_REGION_MEANING, SEGMENT_REGION_VALUE,
     SEGMENT_TYPE_MEANING, SEGMENT_TYPE_VALUE,
 };

@@ -11,11 +11,6 @@
 //! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that gates are moments of one
 //! beat; a fit tells ([`crate::heart::beat`]), and a warning says what was taken for what.
 
-use super::attributes::{
-    ACQUISITION_NUMBER, Attribute, Attributes, INSTANCE_NUMBER, RR_INTERVALS, SERIES_NUMBER,
-    TEMPORAL_POSITION, TIME_SLOTS, TRIGGER_TIME,
-};
-use super::kind::Kind;
 use super::one_scan::{Reach, ScanStatement, contradiction};
 use super::{Content, DicomFile, ScannedFile, StoredSlice, VolumeError, timing};
 use crate::base::progress::Monitor;
@@ -26,6 +21,11 @@ use crate::image::volume::source::VolumeFile;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 use std::mem;
+use ventriform_dicom::read::attributes::{
+    ACQUISITION_NUMBER, Attribute, Attributes, INSTANCE_NUMBER, RR_INTERVALS, SERIES_NUMBER,
+    TEMPORAL_POSITION, TIME_SLOTS, TRIGGER_TIME,
+};
+use ventriform_dicom::read::kind::Kind;
 
 /// Numbers by which gates are ordered, the surest first.
 const ORDERING_ATTRIBUTES: [Attribute; 5] = [

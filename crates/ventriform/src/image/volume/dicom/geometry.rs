@@ -11,14 +11,14 @@
 use super::super::VolumeError;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
-use super::attributes::{
-    Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_PIXEL_SPACING, ORIENTATION,
-    PIXEL_SPACING, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
-};
 use super::posture;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
+use ventriform_dicom::read::attributes::{
+    Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_PIXEL_SPACING, ORIENTATION,
+    PIXEL_SPACING, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
+};
 
 /// Largest deviation of direction cosines from unit length and from a right angle.
 const COSINE_SLACK: f64 = 1e-2;
@@ -91,27 +91,31 @@ pub(super) fn pixel_spacing(a: &Attributes, frame: Option<usize>) -> Result<[f64
         None => a.decimals(PIXEL_SPACING)?,
     };
     let Some([between_rows, between_columns]) = stated else {
-        return Err(a.missing(PIXEL_SPACING));
+        return Err(a.missing(PIXEL_SPACING).into());
     };
     if between_rows > 0.0 && between_columns > 0.0 {
         Ok([between_rows, between_columns])
     } else {
-        Err(a.wrong(
-            PIXEL_SPACING.name,
-            &format!("{between_rows}\\{between_columns}"),
-            "expected positive numbers".into(),
-        ))
+        Err(a
+            .wrong(
+                PIXEL_SPACING.name,
+                &format!("{between_rows}\\{between_columns}"),
+                "expected positive numbers".into(),
+            )
+            .into())
     }
 }
 
 /// Signed distance of slices along row x column, mm.
 fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, VolumeError> {
     match a.decimals(SPACING_BETWEEN_SLICES)? {
-        Some([0.0]) => Err(a.wrong(
-            SPACING_BETWEEN_SLICES.name,
-            "0",
-            "slices must lie at different positions".into(),
-        )),
+        Some([0.0]) => Err(a
+            .wrong(
+                SPACING_BETWEEN_SLICES.name,
+                "0",
+                "slices must lie at different positions".into(),
+            )
+            .into()),
         Some([spacing]) => Ok(spacing),
         None => match a.decimals(SLICE_THICKNESS)? {
             Some([thickness]) if thickness > 0.0 => {
@@ -121,7 +125,7 @@ fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, Volu
                 ));
                 Ok(thickness)
             }
-            _ => Err(a.missing(SPACING_BETWEEN_SLICES)),
+            _ => Err(a.missing(SPACING_BETWEEN_SLICES).into()),
         },
     }
 }
@@ -134,10 +138,12 @@ pub(super) fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec
     if unit(&x) && unit(&y) && x.dot(&y).abs() <= COSINE_SLACK {
         Ok((x.normalize(), y.normalize()))
     } else {
-        Err(a.wrong(
-            DETECTOR_ORIENTATION.name,
-            &format!("{cosines:?}"),
-            "expected two perpendicular unit vectors".into(),
-        ))
+        Err(a
+            .wrong(
+                DETECTOR_ORIENTATION.name,
+                &format!("{cosines:?}"),
+                "expected two perpendicular unit vectors".into(),
+            )
+            .into())
     }
 }

@@ -4,18 +4,20 @@
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::VolumeFile;
-use super::attributes::{
-    ACQUISITION_TIME, Attribute, Attributes, COLUMNS, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
-    ORIENTATION, PIXEL_SPACING, ROWS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_CLASS,
-    SOP_INSTANCE, STUDY_DESCRIPTION, STUDY_UID,
-};
-use super::kind::Kind;
 use super::one_scan::ScanStatement;
-use super::{guarded, kind, scan, syntax, timing};
+use super::stored::StoredDataSet;
+use super::timing;
 use crate::base::progress::Monitor;
 use crate::base::text::hex;
 use sha2::{Digest, Sha256};
 use std::fmt;
+use ventriform_dicom::read::attributes::{
+    ACQUISITION_TIME, Attribute, Attributes, COLUMNS, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
+    ORIENTATION, PIXEL_SPACING, ROWS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_CLASS,
+    SOP_INSTANCE, STUDY_DESCRIPTION, STUDY_UID,
+};
+use ventriform_dicom::read::kind::{self, Kind};
+use ventriform_dicom::read::{scan, syntax};
 
 /// Longest UID (PS3.5, 9.1).
 const LONGEST_UID: usize = 64;
@@ -66,15 +68,16 @@ pub fn read_header(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<DicomHeader, VolumeError> {
-    let syntax = syntax::find(file, limits)?;
+    let stored = StoredDataSet::find(file, limits)?;
+    let syntax = &stored.syntax;
     let longest = if syntax.deflated {
         let longest = syntax.data_set.saturating_add(LONGEST_INFLATED_BYTES);
         longest.min(limits.unpacked_bytes)
     } else {
         limits.unpacked_bytes
     };
-    let mut source = syntax.open(file, longest)?;
-    let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
+    let mut source = stored.open(file, longest)?;
+    let a = scan::attributes(&mut source, syntax, &monitor.goes_on())?;
     let sop_class = uid(&a, SOP_CLASS)?;
     let kind = Kind::from_attributes(&a).ok();
     let is_gate = kind.is_some_and(|kind| {
@@ -137,11 +140,13 @@ fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
     if text.len() <= LONGEST_UID && text.split('.').all(number) {
         Ok(text)
     } else {
-        Err(a.wrong(
-            attribute.name,
-            &text,
-            format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
-        ))
+        Err(a
+            .wrong(
+                attribute.name,
+                &text,
+                format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
+            )
+            .into())
     }
 }
 
@@ -152,5 +157,5 @@ pub fn storage_classes() -> Vec<String> {
 
 /// UIDs of the transfer syntaxes that are read.
 pub fn transfer_syntaxes() -> Vec<&'static str> {
-    syntax::read().collect()
+    syntax::read_syntaxes().collect()
 }

@@ -3,76 +3,55 @@
 //! In: one file, or the files of a series. Out: voxels, their place in the patient, and whose scan it
 //! is. After DICOM PS3.3 and PS3.5:
 //!
-//! 1. `syntax`: finds the data set, its encoding and the compression of its pixels.
-//! 2. `scan`: one pass over the data set collects the needed `attributes` and finds the pixels. It
-//!    follows at most 32 nested sequences and rejects lengths beyond the size of the file. `unknown`:
-//!    elements that a program wrote without knowing them. `representation`: values in another representation
-//!    than the standard's.
-//! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
+//! 1. `stored`: the data set of a file, whose attributes [`ventriform_dicom::read`] collects in one pass up to the
+//!    pixels.
+//! 2. What the object is, the same crate says. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
-//! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them; `posture`: what
+//! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `posture`: what
 //!    else says how they lie in the patient.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
 //!    one place belong together. `segments`: labels. `gate_series`: files or series of one gate each.
 //!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
-//! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
-//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text; `rest_stress`: which
-//!    scan of a study they name.
+//! 4. `pixels`: checks the pixel format and decodes frame by frame ([`ventriform_dicom::codec`]).
+//! 5. `provenance`: patient, study, series, instances and acquisition; `rest_stress`: which scan of a study they name.
 //!
 //! Guaranteed: no memory is taken for a stated size before the file was found large enough for it;
 //! beside the voxels, one compressed frame and at most 16 MiB of attributes are held. A damaged
 //! compressed frame is an error, even if a decoder panics.
 //!
 //! Not read: pixels in colour, JPEG with more than 8 bits that is not lossless, High-Throughput
-//! JPEG 2000, JPEG XL, video, and values that are mapped by a table or in ranges (`real_world`).
+//! JPEG 2000, JPEG XL, video, and values that are mapped by a table or in ranges.
 
-mod attributes;
-mod characters;
-mod codec;
 mod company;
 mod described;
-mod fragments;
-mod frames;
 mod gate_series;
 mod geometry;
 mod header;
-mod kind;
 pub(crate) mod one_scan;
 mod pixels;
 mod posture;
 mod provenance;
-mod real_world;
-mod representation;
 mod rest_stress;
-mod scan;
 mod scans;
 mod segments;
 mod stack;
-mod syntax;
+mod stored;
 mod timing;
-mod unknown;
 mod volumes;
 
 #[cfg(test)]
 mod tests;
 
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
-pub(super) use syntax::is_dicom;
+pub(super) use ventriform_dicom::read::syntax::is_dicom;
 
-use self::attributes::{
-    Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
-    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE,
-    TIME_SLICES, TIME_SLOTS,
-};
-use self::frames::FrameOrder;
 use self::gate_series::{Joined, Place};
-use self::kind::Kind;
 use self::one_scan::{Reach, ScanStatement, contradiction};
 use self::pixels::{Pixels, too_many_voxels};
-use self::scan::Scan;
 use self::scans::Scans;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
+use self::stored::StoredDataSet;
 use self::volumes::Marks;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
@@ -81,14 +60,21 @@ use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
-use super::values::is_uid;
 use super::{Provenance, Segment, VolumeError};
 use crate::base::progress::{Monitor, Stage};
 use crate::image::grid::gates::GATE_COUNTS;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::mem;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use ventriform_dicom::read::attributes::{
+    Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
+    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE,
+    TIME_SLICES, TIME_SLOTS,
+};
+use ventriform_dicom::read::frames::FrameOrder;
+use ventriform_dicom::read::kind::Kind;
+use ventriform_dicom::read::scan::{self, Scan};
+use ventriform_dicom::values::is_uid;
 
 /// DICOM files whose attributes have been read and checked.
 pub(super) struct DicomFile {
@@ -132,21 +118,6 @@ struct StoredSlice {
     slice: usize,
 }
 
-/// Runs a pass over the data set of `file`. The parser states invariants of its own by panics, which
-/// are errors of the file.
-fn guarded<T>(
-    file: &VolumeFile,
-    pass: impl FnOnce() -> Result<T, VolumeError>,
-) -> Result<T, VolumeError> {
-    catch_unwind(AssertUnwindSafe(pass)).unwrap_or_else(|_| {
-        Err(VolumeError::Corrupt {
-            file: file.name().into(),
-            byte: 0,
-            reason: "the data set's structure contradicts itself".into(),
-        })
-    })
-}
-
 /// The scan of one file.
 struct ScannedFile {
     scan: Scan,
@@ -159,10 +130,10 @@ impl ScannedFile {
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        let syntax = syntax::find(file, limits)?;
-        let mut source = syntax.open(file, limits.unpacked_bytes)?;
-        let scan = guarded(file, || scan::scan(&mut source, &syntax, monitor))?;
-        let pixels = Pixels::new(&scan, file, syntax, limits)?;
+        let stored = StoredDataSet::find(file, limits)?;
+        let mut source = stored.open(file, limits.unpacked_bytes)?;
+        let scan = scan::scan(&mut source, &stored.syntax, &monitor.goes_on())?;
+        let pixels = Pixels::new(&scan, file, stored, limits)?;
         Ok(Self { scan, pixels })
     }
 
@@ -257,7 +228,7 @@ impl DicomFile {
                 }
                 let gap = stated_gap(a)?;
                 if located.len() == 1 && gap.is_none() {
-                    return Err(a.missing(SLICE_THICKNESS));
+                    return Err(a.missing(SLICE_THICKNESS).into());
                 }
                 let name = |frame| format!("frame {}", frame + 1);
                 let stack = Stack::new(&located, pixels.extent, gap, &name);
@@ -434,7 +405,9 @@ fn check_numbers(
     if let Some(stated) = stated(NUMBER_OF_SLICES) {
         if stated > slices {
             let reason = format!("the frames hold {slices} slices; slices are missing");
-            return Err(a.wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason));
+            return Err(a
+                .wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason)
+                .into());
         }
         if stated < slices {
             warnings.push(format!(
@@ -452,7 +425,7 @@ fn check_numbers(
         if stated > held {
             let reason =
                 format!("the frames hold {held} {what} ({gates} gates); gates are missing");
-            return Err(a.wrong(number.name, &stated.to_string(), reason));
+            return Err(a.wrong(number.name, &stated.to_string(), reason).into());
         }
     }
     Ok(())
@@ -486,7 +459,7 @@ fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
             format!(
                 "the Per-frame Functional Groups Sequence (5200,9230) describes {described} frames"
             ),
-        ))
+        ).into())
     } else {
         Ok(())
     }

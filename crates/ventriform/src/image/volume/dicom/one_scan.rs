@@ -15,7 +15,9 @@
 //!
 //! Guaranteed: the order of the files changes neither the verdict nor which two files an error names.
 
-use super::attributes::{
+use super::rest_stress::rest_or_stress;
+use std::collections::BTreeMap;
+use ventriform_dicom::read::attributes::{
     ACQUISITION_DATE, ACQUISITION_TIME, ATTENUATION_METHOD, Attribute, Attributes,
     CONVOLUTION_KERNEL, CORRECTED_IMAGE, COUNTS_SOURCE, DECAY_CORRECTION, ENERGY_LOWER,
     ENERGY_UPPER, FRAME_OF_REFERENCE, IMAGE_TYPE, INJECTED_DOSE, INJECTION_TIME, INSTANCE_NUMBER,
@@ -25,8 +27,6 @@ use super::attributes::{
     RECONSTRUCTION_METHOD, RESCALE_TYPE, SCATTER_METHOD, SERIES_DESCRIPTION, SERIES_TYPE,
     SOP_CLASS, STUDY_DATE, STUDY_UID, SUV_TYPE, UNITS, clip,
 };
-use super::rest_stress::rest_or_stress;
-use std::collections::BTreeMap;
 
 /// Farthest that the Acquisition Times of gates of one beat may lie apart, which are acquired together, s.
 const SAME_ACQUISITION_S: f64 = 60.0;

@@ -6,19 +6,20 @@ use super::super::decode::{DataType, Figures, Padding, VoxelFormat, VoxelReader}
 use super::super::facts::ByteOrder;
 use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
-use super::attributes::{
+use super::stored::StoredDataSet;
+use crate::base::progress::Cancelled;
+use ventriform_dicom::Endianness;
+use ventriform_dicom::codec::{self, FrameError, FrameLayout};
+use ventriform_dicom::read::attributes::{
     Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, DOUBLE_PADDING, DOUBLE_PADDING_LIMIT,
     FLOAT_PADDING, FLOAT_PADDING_LIMIT, FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT,
     MODALITY_TABLE, NUMBER_OF_FRAMES, PADDING, PADDING_LIMIT, PHOTOMETRIC, PIXEL_REPRESENTATION,
     RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
-use super::codec::{self, FrameError, FrameLayout};
-use super::fragments::frames_of;
-use super::kind::{Kind, is_ct};
-use super::real_world::MAPPING_NAME;
-use super::scan::{Fragment, PixelElement, PixelPlace, Scan};
-use super::syntax::Syntax;
-use crate::base::progress::Cancelled;
+use ventriform_dicom::read::fragments::frames_of;
+use ventriform_dicom::read::kind::{Kind, is_ct};
+use ventriform_dicom::read::real_world::MAPPING_NAME;
+use ventriform_dicom::read::scan::{Fragment, PixelElement, PixelPlace, Scan};
 
 /// Slope and intercept; `None` if the values are stored as they are.
 pub(super) type Scaling = Option<(f64, f64)>;
@@ -26,7 +27,7 @@ pub(super) type Scaling = Option<(f64, f64)>;
 /// The pixels of one file.
 pub(super) struct Pixels {
     file: VolumeFile,
-    syntax: Syntax,
+    stored: StoredDataSet,
     /// Most unpacked bytes of the file to read.
     limit: u64,
     /// Columns and rows.
@@ -64,7 +65,7 @@ impl Pixels {
     pub(super) fn new(
         scan: &Scan,
         file: &VolumeFile,
-        syntax: Syntax,
+        stored: StoredDataSet,
         limits: &ReadLimits,
     ) -> Result<Self, VolumeError> {
         let a = &scan.attributes;
@@ -113,7 +114,7 @@ impl Pixels {
                 PixelPlace::Fragments { offsets, fragments } => {
                     if bits {
                         let reason = "bits are not compressed in this transfer syntax".into();
-                        return Err(a.wrong(BITS_ALLOCATED.name, "1", reason));
+                        return Err(a.wrong(BITS_ALLOCATED.name, "1", reason).into());
                     }
                     let pixels = extent[0] * extent[1];
                     if pixels > codec::MOST_PIXELS {
@@ -153,7 +154,10 @@ impl Pixels {
             byte_order: match storage {
                 // Decoded frames are little endian.
                 Storage::Frames(_) | Storage::Bits { .. } => ByteOrder::Little,
-                Storage::Whole { .. } => scan.byte_order,
+                Storage::Whole { .. } => match scan.byte_order {
+                    Endianness::Little => ByteOrder::Little,
+                    Endianness::Big => ByteOrder::Big,
+                },
             },
             limit: limits.unpacked_bytes,
             extent,
@@ -163,7 +167,7 @@ impl Pixels {
             padding: padding(scan, data_type, unused_bits),
             scaling,
             storage,
-            syntax,
+            stored,
         })
     }
 
@@ -179,7 +183,7 @@ impl Pixels {
 
     /// Whether the file is gzipped.
     pub(super) fn is_gzip(&self) -> bool {
-        self.syntax.gzip
+        self.stored.gzip
     }
 
     /// Slope and intercept of stored frame number `frame`.
@@ -192,7 +196,7 @@ impl Pixels {
     pub(super) fn open(&self) -> Result<FrameReader<'_>, VolumeError> {
         Ok(FrameReader {
             pixels: self,
-            source: self.syntax.open(&self.file, self.limit)?,
+            source: self.stored.open(&self.file, self.limit)?,
             bits: BitRow::default(),
         })
     }
@@ -312,11 +316,11 @@ impl FrameReader<'_> {
             self.source.fill_all(&mut packed[filled..end], needed)?;
             filled = end;
         }
-        codec::decode(pixels.syntax.compression, &packed, layout, report).map_err(|error| {
-            match error {
-                FrameError::Wrong(reason) => corrupt(begin, reason),
-                FrameError::Cancelled(cancelled) => cancelled.into(),
-            }
+        let mut goes_on = || report().is_ok();
+        let compression = pixels.stored.syntax.compression;
+        codec::decode(compression, &packed, layout, &mut goes_on).map_err(|error| match error {
+            FrameError::Wrong(reason) => corrupt(begin, reason),
+            FrameError::Stopped => Cancelled.into(),
         })
     }
 }
@@ -369,12 +373,12 @@ fn check_colours(a: &Attributes) -> Result<(), VolumeError> {
     let samples = a.shorts(SAMPLES).first().copied().unwrap_or(1);
     if samples != 1 {
         let reason = "expected 1: colour images are not supported".into();
-        return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason));
+        return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason).into());
     }
     match a.text(PHOTOMETRIC) {
         Some(meaning) if !meaning.starts_with("MONOCHROME") => {
             let reason = "expected MONOCHROME1 or MONOCHROME2".into();
-            Err(a.wrong(PHOTOMETRIC.name, &meaning, reason))
+            Err(a.wrong(PHOTOMETRIC.name, &meaning, reason).into())
         }
         _ => Ok(()),
     }
@@ -383,7 +387,9 @@ fn check_colours(a: &Attributes) -> Result<(), VolumeError> {
 fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
     let frames = match a.decimals(NUMBER_OF_FRAMES)? {
         Some([frames]) => frames,
-        None if matches!(kind, Kind::Nuclear { .. }) => return Err(a.missing(NUMBER_OF_FRAMES)),
+        None if matches!(kind, Kind::Nuclear { .. }) => {
+            return Err(a.missing(NUMBER_OF_FRAMES).into());
+        }
         None => 1.0,
     };
     let (most, reason) = if kind.is_single_slice() {
@@ -395,7 +401,9 @@ fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
     if frames.fract() == 0.0 && (1.0..=most).contains(&frames) {
         Ok(frames as usize)
     } else {
-        Err(a.wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into()))
+        Err(a
+            .wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into())
+            .into())
     }
 }
 
@@ -408,7 +416,7 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         PixelElement::Double => return Ok((DataType::F64, 0)),
     }
     let allocated = a.short(BITS_ALLOCATED)?;
-    if allocated == 1 && scan.kind == Kind::Segmentation && a.byte_order == ByteOrder::Little {
+    if allocated == 1 && scan.kind == Kind::Segmentation && a.byte_order == Endianness::Little {
         return Ok((DataType::U8, 0));
     }
     let signed = match a.short(PIXEL_REPRESENTATION)? {
@@ -416,14 +424,16 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         1 => true,
         other => {
             let reason = "expected 0 (unsigned) or 1 (signed)".into();
-            return Err(a.wrong(PIXEL_REPRESENTATION.name, &other.to_string(), reason));
+            return Err(a
+                .wrong(PIXEL_REPRESENTATION.name, &other.to_string(), reason)
+                .into());
         }
     };
     let data_type = match (allocated, signed) {
         // Two 8-bit pixels share a word in swapped order.
-        (8, _) if a.byte_order == ByteOrder::Big && scan.words => {
+        (8, _) if a.byte_order == Endianness::Big && scan.words => {
             let reason = "8-bit pixels in big endian words are not supported".into();
-            return Err(a.wrong(BITS_ALLOCATED.name, "8", reason));
+            return Err(a.wrong(BITS_ALLOCATED.name, "8", reason).into());
         }
         (8, false) => DataType::U8,
         (8, true) => DataType::I8,
@@ -433,18 +443,22 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         (32, true) => DataType::I32,
         (other, _) => {
             let reason = "expected 8, 16 or 32".into();
-            return Err(a.wrong(BITS_ALLOCATED.name, &other.to_string(), reason));
+            return Err(a
+                .wrong(BITS_ALLOCATED.name, &other.to_string(), reason)
+                .into());
         }
     };
     let stored = a.shorts(BITS_STORED).first().copied().unwrap_or(allocated);
     if stored == 0 || stored > allocated {
         let reason = format!("expected 1 to {allocated} (Bits Allocated)");
-        return Err(a.wrong(BITS_STORED.name, &stored.to_string(), reason));
+        return Err(a
+            .wrong(BITS_STORED.name, &stored.to_string(), reason)
+            .into());
     }
     let high_bit = a.shorts(HIGH_BIT).first().copied().unwrap_or(stored - 1);
     if high_bit != stored - 1 {
         let reason = format!("expected {} (Bits Stored - 1)", stored - 1);
-        return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason));
+        return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason).into());
     }
     Ok((data_type, u32::from(allocated - stored)))
 }
@@ -460,11 +474,13 @@ fn check_surplus(
     let of_one = (bytes / frames as u64).max(1);
     let held = length / of_one;
     if voxels > 0 && held > frames as u64 && length - bytes >= of_one.max(2) {
-        Err(a.wrong(
-            NUMBER_OF_FRAMES.name,
-            &frames.to_string(),
-            format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
-        ))
+        Err(a
+            .wrong(
+                NUMBER_OF_FRAMES.name,
+                &frames.to_string(),
+                format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
+            )
+            .into())
     } else {
         Ok(())
     }
@@ -551,7 +567,7 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
     }
     if found.is_none() && !a.shorts(MODALITY_TABLE).is_empty() {
         let reason = "values by a table are not supported; expected Rescale Slope".into();
-        return Err(a.wrong(MODALITY_TABLE.name, "present", reason));
+        return Err(a.wrong(MODALITY_TABLE.name, "present", reason).into());
     }
     if found.is_none() {
         let mapping = a.mappings.linear(frame);
@@ -566,7 +582,7 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
     if !slope.is_finite() || (slope == 0.0 && !is_rescale) || !inter.is_finite() {
         let value = format!("{slope} (intercept {inter})");
         let reason = "expected a finite slope other than 0 and a finite intercept".into();
-        return Err(a.wrong(field, &value, reason));
+        return Err(a.wrong(field, &value, reason).into());
     }
     Ok(((slope, inter) != (1.0, 0.0)).then_some((slope, inter)))
 }

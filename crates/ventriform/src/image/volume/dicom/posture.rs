@@ -18,12 +18,12 @@
 //! patient's.
 
 use super::super::VolumeError;
-use super::attributes::{
+use crate::base::geometry::Vec3;
+use ventriform_dicom::read::attributes::{
     Attribute, Attributes, DETECTOR_VIEW, DETECTOR_VIEW_MEANING, GANTRY, GANTRY_MEANING,
     PATIENT_LETTERS, PATIENT_POSITION, POSTURE, POSTURE_MEANING, PROGRESSION, VIEW, VIEW_MEANING,
     clip,
 };
-use crate::base::geometry::Vec3;
 
 /// Greatest angle between the directions of slices and the patient's axes at which they are the patient's, degrees.
 const MAX_PLAIN_ANGLE_DEG: f64 = 1.0;
@@ -358,7 +358,7 @@ pub(super) fn assumed(a: &Attributes) -> Result<Assumed, VolumeError> {
                 "without it the patient's position tells how the slices lie, and {reason}; send the file with Image \
                  Orientation (Patient), or with one of both removed"
             ),
-        ));
+        ).into());
     }
     let mut warning = if position.cited.is_empty() {
         format!("{WITHOUT}: axial slices of a supine patient are assumed.")

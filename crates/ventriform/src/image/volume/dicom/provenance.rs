@@ -1,7 +1,8 @@
 //! The [`Provenance`] that a data set states (PS3.3 C.7, C.8.4).
 
 use super::super::Provenance;
-use super::attributes::{
+use super::rest_stress::rest_or_stress;
+use ventriform_dicom::read::attributes::{
     ACCESSION_NUMBER, ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_TIME, Attributes,
     CONTENT_DATE, CONVOLUTION_KERNEL, CORRECTED_IMAGE, FRAME_OF_REFERENCE, IMAGE_TYPE,
     INJECTED_DOSE, INJECTION_DATE_TIME, INJECTION_TIME, MANUFACTURER, MODALITY, MODEL_NAME,
@@ -11,7 +12,6 @@ use super::attributes::{
     SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE,
     STUDY_DATE, STUDY_DESCRIPTION, STUDY_ID, STUDY_TIME, STUDY_UID, UNITS, clip,
 };
-use super::rest_stress::rest_or_stress;
 
 macro_rules! attributes_of_fields {
     ($($field:ident = $attribute:expr;)*) => {

@@ -12,7 +12,7 @@
 //! A run that only contains the letters of such a word (`Forrest`, `arrest`, `interest`, `distress`, `prestress`) names
 //! neither.
 
-use super::attributes::{
+use ventriform_dicom::read::attributes::{
     Attributes, CONTEXT_MEANING, PROTOCOL_MEANING, PROTOCOL_NAME, SERIES_DESCRIPTION,
     STUDY_DESCRIPTION,
 };

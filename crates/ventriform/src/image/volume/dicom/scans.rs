@@ -1,10 +1,10 @@
 //! The scans in files that are not one volume, for an error that lists them: by name, series, and what differs.
 
 use super::ScannedFile;
-use super::attributes::{SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, clip};
 use super::one_scan::{ScanStatement, differing};
 use crate::image::grid::gates::GATE_COUNTS;
 use std::collections::{BTreeMap, BTreeSet};
+use ventriform_dicom::read::attributes::{SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, clip};
 
 /// Most scans that are listed.
 const MOST_LISTED: usize = 8;

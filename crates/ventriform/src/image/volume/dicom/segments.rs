@@ -8,10 +8,12 @@ use super::super::decode::Figures;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
 use super::super::{Segment, VolumeError};
-use super::attributes::{Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENTATION_TYPE};
 use super::pixels::{Pixels, too_many_voxels};
 use super::stack::{Located, heights, stated_gap};
 use crate::base::progress::{Monitor, Stage};
+use ventriform_dicom::read::attributes::{
+    Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENTATION_TYPE, SPACING_BETWEEN_SLICES,
+};
 
 /// Most slices of the grid for each stored frame; segmentations cover few slices of long scans.
 const MOST_SLICES: f64 = 4096.0;
@@ -71,7 +73,7 @@ impl Segments {
             other => {
                 let value = other.unwrap_or("missing");
                 let reason = "expected BINARY, FRACTIONAL or LABELMAP".into();
-                return Err(a.wrong(SEGMENTATION_TYPE.name, value, reason));
+                return Err(a.wrong(SEGMENTATION_TYPE.name, value, reason).into());
             }
         };
         let located = (0..pixels.frames).map(|frame| Located::new(a, 0, frame));
@@ -91,7 +93,7 @@ impl Segments {
             Some(gap) if gap <= nearest * (1.0 + PLACE_SLACK) => gap,
             _ if nearest.is_finite() => nearest,
             Some(gap) => gap,
-            None => return Err(a.missing(super::attributes::SPACING_BETWEEN_SLICES)),
+            None => return Err(a.missing(SPACING_BETWEEN_SLICES).into()),
         };
         let mut frames = Vec::with_capacity(heights.len());
         for (frame, height) in heights.iter().enumerate() {
@@ -101,13 +103,14 @@ impl Segments {
                 return Err(contradiction(format!(
                     "frame {} lies {place:.2} slices of {gap:.3} mm from the first",
                     frame + 1
-                )));
+                ))
+                .into());
             }
             let segment = a.shorts_of(FRAME_SEGMENT, Some(frame)).first().copied();
             match (segment, meaning) {
                 (_, Meaning::Label) => frames.push((slice as usize, 0)),
                 (Some(segment @ 1..), _) => frames.push((slice as usize, segment)),
-                _ => return Err(a.missing(FRAME_SEGMENT)),
+                _ => return Err(a.missing(FRAME_SEGMENT).into()),
             }
         }
         let slices = frames.iter().map(|(slice, _)| slice + 1).max().unwrap_or(1);

@@ -16,19 +16,19 @@
 use super::super::VolumeError;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
-use super::attributes::{
-    Attribute, Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_BETWEEN_SLICES,
-    FRAME_ORIENTATION, FRAME_POSITION, FRAME_THICKNESS, ORIENTATION, POSITION, SLICE_THICKNESS,
-    SPACING_BETWEEN_SLICES,
-};
 use super::geometry::{directions, pixel_spacing};
-use super::kind::is_nuclear;
 use super::posture;
 use super::volumes::{Marks, deal};
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
+use ventriform_dicom::read::attributes::{
+    Attribute, Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_BETWEEN_SLICES,
+    FRAME_ORIENTATION, FRAME_POSITION, FRAME_THICKNESS, ORIENTATION, POSITION, SLICE_THICKNESS,
+    SPACING_BETWEEN_SLICES,
+};
+use ventriform_dicom::read::kind::is_nuclear;
 
 /// Positions closer than this are the same, mm.
 const SAME_POSITION: f64 = 0.01;

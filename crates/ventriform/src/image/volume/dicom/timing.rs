@@ -7,7 +7,7 @@
 
 use super::super::VolumeError;
 use super::super::gate_timing::GateTiming;
-use super::attributes::{
+use ventriform_dicom::read::attributes::{
     Attribute, Attributes, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE, FRAME_HIGH_RR,
     FRAME_INTERVALS_ACQUIRED, FRAME_INTERVALS_REJECTED, FRAME_LOW_RR, FRAME_RR_NOMINAL, FRAME_TIME,
     FRAME_TRIGGER_DELAY, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
@@ -16,8 +16,8 @@ use super::attributes::{
     OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
     TRIGGER_TIME,
 };
-use super::frames::counted;
-use super::kind::Kind;
+use ventriform_dicom::read::frames::counted;
+use ventriform_dicom::read::kind::Kind;
 
 /// Milliseconds of a minute.
 const MINUTE_MS: f64 = 60_000.0;
@@ -141,7 +141,7 @@ fn number(
     match a.decimals_of::<1>(attribute, frame)? {
         Some([number]) if number < 0.0 => {
             let reason = "a duration or a count is 0 or more".to_owned();
-            Err(a.wrong(attribute.name, &number.to_string(), reason))
+            Err(a.wrong(attribute.name, &number.to_string(), reason).into())
         }
         Some([number]) => Ok(Some(number)),
         None => Ok(None),

@@ -21,7 +21,8 @@
 //!    Numbers that run through the volumes at each position say nothing of which belong together, because
 //!    every order of writing the files gives such numbers.
 
-use super::attributes::{
+use std::cmp::Ordering;
+use ventriform_dicom::read::attributes::{
     ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_NUMBER, ACQUISITION_TIME, Attribute,
     Attributes, B_VALUE, CARDIAC_PHASE, CONTENT_DATE, CONTENT_TIME, CONVOLUTION_KERNEL,
     ECHO_NUMBERS, ECHO_TIME, FLIP_ANGLE, FRAME_ACQUISITION_NUMBER, FRAME_ACTUAL_DELAY,
@@ -34,7 +35,6 @@ use super::attributes::{
     OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, TEMPORAL_POSITION, TIME_SLOT_VECTOR, TRIGGER_DELAY,
     TRIGGER_TIME,
 };
-use std::cmp::Ordering;
 
 /// Most numbers of Dimension Index Values that are compared.
 const MOST_DIMENSIONS: usize = 16;

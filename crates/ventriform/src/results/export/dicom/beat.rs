@@ -7,23 +7,21 @@
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
 //! segments, unless the gates are no beat, and those beside normal limits ([`normals`]). A figure that the report lacks
-//! is left out, and so are phases that are not reliable; their scatter by noise stays. EDV, ESV and EF have the ends of the interval that holds the
-//! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
+//! is left out, and so are phases that are not reliable; their scatter by noise stays. EDV, ESV and EF have the ends of
+//! the interval that holds the true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
-use super::data_set::DataSet;
 use super::normals;
-use super::structured_report::{
-    self as sr, RANGES_COMMENT, WALL_SEGMENTS, concept, finding_site, group, measured, text,
-    tracking,
-};
-use super::uid::Uids;
+use super::structured_report::{self as sr, RANGES_COMMENT, WALL_SEGMENTS, measured};
 use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
 use crate::results::figures::beat::{FIGURES, SEGMENT_FIGURES};
-use crate::results::figures::code::{Code, dcm, sct};
 use crate::results::figures::{Group, readable};
 use crate::results::report::BeatReport;
+use ventriform_dicom::write::code::{Code, dcm, sct};
+use ventriform_dicom::write::content::{concept, finding_site, group, text, tracking};
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
 
 /// An end of the beat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,7 +164,7 @@ impl<'a> DicomBeat<'a> {
             format!("{}: measurements of the beat", self.structure.label),
             &mut set,
         );
-        set.file()
+        Ok(set.file()?)
     }
 
     fn groups(&self, uids: &Uids) -> Vec<DataSet> {

@@ -1,10 +1,10 @@
 //! A picture as Secondary Capture Image Storage (PS3.3 A.8.1), in colour.
 
-use super::data_set::DataSet;
 use super::{DicomError, SourceScan, Structure};
 use crate::image::draw::Image;
 use crate::results::report::DrawnPage;
-use dicom_dictionary_std::tags;
+use ventriform_dicom::tags;
+use ventriform_dicom::write::data_set::DataSet;
 
 /// The pixels of a PNG file of an object; `name` names the object in errors.
 ///

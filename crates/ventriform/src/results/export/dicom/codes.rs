@@ -1,7 +1,8 @@
 //! The coded concepts of the objects, from DICOM PS3.16.
 
 use crate::image::volume::nifti::LabelEntry;
-use crate::results::figures::code::{Code, dcm, own, sct};
+use crate::results::figures::code::own;
+use ventriform_dicom::write::code::{Code, dcm, sct};
 
 pub(super) const ANATOMICAL_STRUCTURE: Code = sct("91723000", "Anatomical Structure");
 /// PS3.16 has the ventricle and its wall, but not its cavity.

@@ -10,22 +10,21 @@
 //! segments in each state, and one of each segment's change. The group of a scan names the limits that its scores stand
 //! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
 
-use super::data_set::DataSet;
 use super::normals::{limits_used, patient_state};
-use super::structured_report::{
-    self as sr, WALL_SEGMENTS, concept, finding_site, group, measured, text, tracking,
-};
-use super::uid::Uids;
+use super::structured_report::{self as sr, WALL_SEGMENTS, measured};
 use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
 use crate::heart::comparison::WhichScan;
 use crate::image::draw::Image;
-use crate::results::figures::code::{Code, dcm};
 use crate::results::figures::comparison::{
     FIGURES, SCAN_FIGURES, SEGMENT_FIGURES, TERRITORY_FIGURES,
 };
 use crate::results::figures::{Group, readable};
 use crate::results::report::{ComparisonReport, ComparisonSheet, DrawnPage, comparison_sheet};
-use dicom_dictionary_std::uids;
+use ventriform_dicom::uids;
+use ventriform_dicom::write::code::{Code, dcm};
+use ventriform_dicom::write::content::{concept, finding_site, group, text, tracking};
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
 
 /// An object of a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,7 +164,7 @@ impl<'a> DicomComparison<'a> {
             self.uids.uid(name),
             &mut set,
         );
-        set.file()
+        Ok(set.file()?)
     }
 
     /// The bytes of an object that shows pictures: `pictures` are those of [`ComparisonObject::pictures`] that there
@@ -213,7 +212,7 @@ impl<'a> DicomComparison<'a> {
         let instance = self.uids.over(name, drawn.image.pixels.as_flattened());
         capture::put(scan, self.structure, name, drawn, &mut set)?;
         self.put(object, instance, &mut set);
-        set.file().map(Some)
+        Ok(Some(set.file()?))
     }
 
     /// The page, which names patient and studies unless a scan is freed of the identity.

@@ -11,18 +11,19 @@
 //! [`normals`] too. A figure that the report lacks is left out.
 
 use super::codes::LV_CAVITY;
-use super::data_set::{DataSet, reference};
 use super::normals;
 use super::structured_report::{
-    self as report, RANGES_COMMENT, SeriesReference, WALL_SEGMENTS, concept, finding_site, group,
-    image, measured, text, tracking,
+    self as report, RANGES_COMMENT, SeriesReference, WALL_SEGMENTS, measured,
 };
 use super::{DicomObject, DicomResults};
-use crate::results::figures::code::{Code, dcm, own, sct};
+use crate::results::figures::code::own;
 use crate::results::figures::segmentation::{FIGURES, SEGMENT_FIGURES};
 use crate::results::figures::{Group, readable};
-use dicom_dictionary_std::{tags, uids};
 use serde_json::Value;
+use ventriform_dicom::write::code::{Code, dcm, sct};
+use ventriform_dicom::write::content::{concept, finding_site, group, image, text, tracking};
+use ventriform_dicom::write::data_set::{DataSet, reference};
+use ventriform_dicom::{tags, uids};
 
 /// A part of a ventricle that has figures of its own.
 struct Part {

@@ -30,7 +30,6 @@ mod beat;
 mod capture;
 mod codes;
 mod comparison;
-mod data_set;
 mod measurements;
 mod normals;
 mod segmentation;
@@ -39,7 +38,6 @@ mod stl;
 mod structure_set;
 mod structured_report;
 mod surface;
-mod uid;
 
 #[cfg(test)]
 mod tests;
@@ -48,20 +46,23 @@ pub use crate::image::volume::is_uid;
 pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use comparison::{ComparisonObject, DicomComparison};
-pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
+pub use ventriform_dicom::write::data_set::{
+    IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start,
+};
 
 use self::codes::{ANATOMICAL_STRUCTURE, DEFORMABLE_MODELS};
-use self::data_set::DataSet;
-use self::uid::Uids;
 use super::ExportError;
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
-use crate::results::figures::code::Code;
 use crate::results::report::{
     DrawnPage, SegmentationReport, SegmentationSheet, segmentation_sheet,
 };
-use dicom_dictionary_std::{tags, uids};
+use ventriform_dicom::write::EncodingError;
+use ventriform_dicom::write::code::Code;
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
+use ventriform_dicom::{tags, uids};
 
 /// Why a result cannot be written as DICOM.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -116,8 +117,8 @@ pub enum DicomError {
         reason: String,
     },
     /// The data set cannot be encoded.
-    #[error("the data set cannot be encoded: {0}")]
-    Encoding(String),
+    #[error(transparent)]
+    Encoding(#[from] EncodingError),
 }
 
 /// An object for the archive.
@@ -372,7 +373,7 @@ impl<'a> DicomResults<'a> {
             ),
             &mut set,
         );
-        set.file()
+        Ok(set.file()?)
     }
 
     /// What a Secondary Capture shows; `None` for other objects.

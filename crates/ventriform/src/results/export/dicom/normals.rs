@@ -8,19 +8,19 @@
 //! rest. Parts without limits or muscle have no group.
 
 use super::Structure;
-use super::data_set::DataSet;
-use super::structured_report::{
-    WALL_SEGMENTS, concept, finding_site, group, measured, text, tracking,
-};
-use super::uid::Uids;
+use super::structured_report::{WALL_SEGMENTS, measured};
 use crate::heart::comparison::WhichScan;
 use crate::heart::normals::{KIND_NOT_STATED, names_protocol, yes_or_no};
-use crate::results::figures::code::{Code, dcm, own, sct};
+use crate::results::figures::code::own;
 use crate::results::figures::perfusion::{
     FIGURES, REST_SCORE, SEGMENT_FIGURES, STRESS_SCORE, SUMMED_SCORE, TERRITORY_FIGURES,
 };
 use crate::results::figures::{Figure, Group, readable};
 use crate::results::report::PerfusionReport;
+use ventriform_dicom::write::code::{Code, dcm, sct};
+use ventriform_dicom::write::content::{concept, finding_site, group, text, tracking};
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
 
 const BESIDE_LIMITS: Code = own("NORMAL-LIMITS", "Comparison with normal limits");
 

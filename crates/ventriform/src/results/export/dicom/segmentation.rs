@@ -8,14 +8,13 @@
 //! readers find it by that.
 
 use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
-use super::data_set::DataSet;
 use super::source::for_processing;
 use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm, put_segment};
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::image::grid::voxelise::Mask;
-use dicom_core::Tag;
-use dicom_dictionary_std::tags;
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::{Tag, tags};
 
 /// Rows, columns and positions of the slices of a volume as DICOM describes them.
 pub(super) struct SlicePlanes {

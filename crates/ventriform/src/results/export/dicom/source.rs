@@ -2,14 +2,13 @@
 
 use super::DicomError;
 use super::codes::SOURCE_FOR_PROCESSING;
-use super::data_set::{DataSet, reference};
-use super::uid::derived;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::base::text::is_printable;
 use crate::image::volume::{Provenance, is_date, is_uid};
-use crate::results::figures::code::dcm;
-use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
+use ventriform_dicom::tags;
+use ventriform_dicom::write::data_set::{DataSet, reference};
+use ventriform_dicom::write::uid::derived;
 
 /// A date and a time as DICOM writes them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -426,7 +425,10 @@ impl SourceScan {
         if self.deidentified {
             set.text(tags::PATIENT_IDENTITY_REMOVED, "YES");
             set.text(tags::LONGITUDINAL_TEMPORAL_INFORMATION_MODIFIED, "REMOVED");
-            let profile = dcm("113100", "Basic Application Confidentiality Profile");
+            let profile = ventriform_dicom::write::code::dcm(
+                "113100",
+                "Basic Application Confidentiality Profile",
+            );
             set.code(tags::DEIDENTIFICATION_METHOD_CODE_SEQUENCE, profile);
         }
     }

@@ -1,12 +1,10 @@
 //! The mesh as Encapsulated STL Storage (PS3.3 A.85.1).
 
-use super::data_set::DataSet;
 use super::{DicomError, DicomResults};
 use crate::results::export::{Format, Metadata, encode};
 use crate::results::figures::Unit;
-use dicom_core::PrimitiveValue;
-use dicom_core::VR;
-use dicom_dictionary_std::tags;
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::{PrimitiveValue, VR, tags};
 
 /// Puts everything that is particular to this object.
 pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), DicomError> {

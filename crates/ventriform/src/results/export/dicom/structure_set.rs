@@ -4,13 +4,13 @@
 //! hole: it is joined with the outer one by a channel of no width, the form that PS3.3 C.8.8.6.3
 //! asks for with CLOSED_PLANAR; readers that fill by parity see the same area.
 
-use super::data_set::{DataSet, reference};
 use super::segmentation::SlicePlanes;
 use super::{DicomError, DicomResults, STRUCTURE_RGB};
 use crate::base::geometry::Vec3;
 use crate::mesh::TriMesh;
-use dicom_dictionary_std::tags;
 use std::collections::BTreeMap;
+use ventriform_dicom::tags;
+use ventriform_dicom::write::data_set::{DataSet, reference};
 
 /// The retired SOP class that PS3.3 C.8.8.5 keeps for references to a study.
 const STUDY_CLASS: &str = "1.2.840.10008.3.1.2.3.1";

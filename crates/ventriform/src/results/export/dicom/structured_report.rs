@@ -4,14 +4,15 @@
 //! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
 //! source images, and the evidence. What is measured stands in the rows of [`crate::results::figures`].
 
-use super::data_set::{DataSet, reference};
 use super::{SourceScan, Structure};
 use crate::base::numeric::decimals::round;
-use crate::results::figures::code::{Code, OWN_SCHEME, dcm, sct};
+use crate::results::figures::code::OWN_SCHEME;
 use crate::results::figures::{Coded, Figure, Group};
-use dicom_core::Tag;
-use dicom_dictionary_std::tags;
 use serde_json::Value;
+use ventriform_dicom::tags;
+use ventriform_dicom::write::code::{Code, dcm, sct};
+use ventriform_dicom::write::content::{concept, container, image, number, template, text, unique};
+use ventriform_dicom::write::data_set::{DataSet, reference};
 
 /// The comment of a group with intervals: no code says how sure a range is.
 pub(super) const RANGES_COMMENT: &str =
@@ -122,7 +123,8 @@ fn context(structure: Structure) -> Vec<DataSet> {
         _ => imaging,
     };
     // The device is the software: one UID for each version.
-    let device = super::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
+    let device =
+        ventriform_dicom::write::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
     vec![
         concept("HAS CONCEPT MOD", language, english),
         concept(
@@ -213,95 +215,6 @@ fn measurement(report: &Value, row: &Figure, coded: Coded) -> Option<DataSet> {
         item.items(tags::CONTENT_SEQUENCE, properties);
     }
     Some(item)
-}
-
-/// A NUM item.
-fn number(relationship: &str, name: Code, value: f64, unit: Code) -> DataSet {
-    let mut measured = DataSet::new();
-    measured.decimals(tags::NUMERIC_VALUE, &[value]);
-    measured.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, unit);
-    let mut item = item(relationship, "NUM", Some(name));
-    item.item(tags::MEASURED_VALUE_SEQUENCE, measured);
-    item
-}
-
-pub(super) fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
-    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
-    vec![
-        text(
-            OBSERVATION_RELATION,
-            dcm("112039", "Tracking Identifier"),
-            name,
-        ),
-        unique(
-            OBSERVATION_RELATION,
-            dcm("112040", "Tracking Unique Identifier"),
-            uid,
-        ),
-    ]
-}
-
-pub(super) fn finding_site(site: Code) -> DataSet {
-    concept("HAS CONCEPT MOD", sct("363698007", "Finding Site"), site)
-}
-
-pub(super) fn group(id: &str, content: Vec<DataSet>) -> DataSet {
-    let mut group = container(dcm("125007", "Measurement Group"), content);
-    group.item(tags::CONTENT_TEMPLATE_SEQUENCE, template(id));
-    group
-}
-
-fn template(id: &str) -> DataSet {
-    let mut item = DataSet::new();
-    item.text(tags::MAPPING_RESOURCE, "DCMR");
-    item.text(tags::TEMPLATE_IDENTIFIER, id);
-    item
-}
-
-fn item(relationship: &str, kind: &str, name: Option<Code>) -> DataSet {
-    let mut item = DataSet::new();
-    item.text(tags::RELATIONSHIP_TYPE, relationship);
-    item.text(tags::VALUE_TYPE, kind);
-    if let Some(name) = name {
-        item.code(tags::CONCEPT_NAME_CODE_SEQUENCE, name);
-    }
-    item
-}
-
-fn with_text(mut item: DataSet, tag: Tag, text: &str) -> DataSet {
-    item.text(tag, text);
-    item
-}
-
-fn container(name: Code, content: Vec<DataSet>) -> DataSet {
-    let mut item = item("CONTAINS", "CONTAINER", Some(name));
-    item.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
-    item.items(tags::CONTENT_SEQUENCE, content);
-    item
-}
-
-pub(super) fn concept(relationship: &str, name: Code, code: Code) -> DataSet {
-    let mut item = item(relationship, "CODE", Some(name));
-    item.code(tags::CONCEPT_CODE_SEQUENCE, code);
-    item
-}
-
-pub(super) fn text(relationship: &str, name: Code, text: &str) -> DataSet {
-    with_text(
-        item(relationship, "TEXT", Some(name)),
-        tags::TEXT_VALUE,
-        text,
-    )
-}
-
-fn unique(relationship: &str, name: Code, uid: &str) -> DataSet {
-    with_text(item(relationship, "UIDREF", Some(name)), tags::UID, uid)
-}
-
-pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet) -> DataSet {
-    let mut item = item(relationship, "IMAGE", name);
-    item.item(tags::REFERENCED_SOP_SEQUENCE, referenced);
-    item
 }
 
 /// Every study with the instances in it that the content refers to; none if it refers to none.

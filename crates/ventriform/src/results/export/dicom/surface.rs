@@ -1,10 +1,9 @@
 //! The mesh as Surface Segmentation Storage (PS3.3 A.57).
 
-use super::data_set::DataSet;
 use super::{DicomError, DicomResults, STRUCTURE_CIELAB, algorithm};
 use crate::results::export::single;
-use dicom_core::{PrimitiveValue, VR};
-use dicom_dictionary_std::tags;
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::{PrimitiveValue, VR, tags};
 
 /// Puts everything that is particular to this object.
 pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), DicomError> {

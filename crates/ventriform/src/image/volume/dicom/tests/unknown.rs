@@ -1,19 +1,20 @@
 //! Values and sequences of unknown or of another representation, and what is stated in an odd way.
 
-use super::super::attributes::WANTED_ATTRIBUTES;
-use super::super::representation::standard;
-use super::super::{scan, syntax};
+use super::super::stored::StoredDataSet;
 use super::objects::{ct, files, read_files};
 use super::*;
 use dicom_core::{Tag, VR};
+use ventriform_dicom::read::attributes::WANTED_ATTRIBUTES;
+use ventriform_dicom::read::representation::standard;
+use ventriform_dicom::read::scan;
 
 /// The attributes of the file in `bytes`.
 fn attributes(bytes: Vec<u8>) -> Attributes {
     let file = VolumeFile::in_memory("test", bytes);
     let limits = ReadLimits::default();
-    let syntax = syntax::find(&file, &limits).unwrap();
-    let mut source = syntax.open(&file, limits.unpacked_bytes).unwrap();
-    scan::attributes(&mut source, &syntax, &Monitor::silent()).unwrap()
+    let stored = StoredDataSet::find(&file, &limits).unwrap();
+    let mut source = stored.open(&file, limits.unpacked_bytes).unwrap();
+    scan::attributes(&mut source, &stored.syntax, &|| true).unwrap()
 }
 
 fn pair(tag: Tag) -> (u16, u16) {

@@ -17,7 +17,7 @@
 //! The tables of single sets are those of `encoding_rs`; where they follow the web's habits instead
 //! of JIS X 0208, [`JIS_DIFFERENCES`] puts the standard's characters in place.
 
-use crate::base::text::is_printable;
+use crate::text::is_printable;
 use dicom_core::VR;
 use encoding_rs::{
     EUC_JP, EUC_KR, Encoding, GB18030, GBK, ISO_8859_2, ISO_8859_3, ISO_8859_4, ISO_8859_5,
@@ -124,7 +124,7 @@ const JIS_DIFFERENCES: [(char, char); 6] = [
 
 /// Division of text, by its value representation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Division {
+pub enum Division {
     /// Codes, numbers, dates, UIDs: always ASCII.
     Codes,
     /// Values separated by backslashes: LO, SH, UC.
@@ -136,7 +136,8 @@ pub(super) enum Division {
 }
 
 impl Division {
-    pub(super) fn from_representation(representation: VR) -> Self {
+    /// That of text in the value representation `representation`.
+    pub fn from_representation(representation: VR) -> Self {
         match representation {
             VR::PN => Self::Names,
             VR::LO | VR::SH | VR::UC => Self::Values,
@@ -157,7 +158,7 @@ impl Division {
 
 /// The character sets that a data set names.
 #[derive(Debug, Clone)]
-pub(super) struct CharacterSets {
+pub struct CharacterSets {
     /// An encoding of whole values, without escape sequences.
     whole: Option<&'static Encoding>,
     /// Those active at the beginning.
@@ -170,7 +171,7 @@ pub(super) struct CharacterSets {
 
 impl CharacterSets {
     /// The sets that the values of Specific Character Set name; none of them: ASCII.
-    pub(super) fn from_terms(terms: &[String]) -> Self {
+    pub fn from_terms(terms: &[String]) -> Self {
         let mut sets = Self {
             whole: None,
             first: (Set::Ascii, None),
@@ -214,7 +215,7 @@ impl CharacterSets {
     }
 
     /// The first term that names no set.
-    pub(super) fn unknown(&self) -> Option<&str> {
+    pub fn unknown(&self) -> Option<&str> {
         self.unknown.as_deref()
     }
 
@@ -222,7 +223,7 @@ impl CharacterSets {
     ///
     /// # Errors
     /// Why it cannot be told, and where. Nothing of the text is in it.
-    pub(super) fn decode(&self, bytes: &[u8], division: Division) -> Result<String, String> {
+    pub fn decode(&self, bytes: &[u8], division: Division) -> Result<String, String> {
         let padding = |b: &&u8| matches!(**b, 0 | b' ');
         let bytes = &bytes[..bytes.len() - bytes.iter().rev().take_while(padding).count()];
         let text = match (self.whole, division) {

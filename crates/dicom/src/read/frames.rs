@@ -7,7 +7,7 @@
 //! Accepted, and said: numbers that count from 0, or from where a cropped volume begins. A study of one R-R
 //! interval needs no vector of intervals, and the pointer may leave out vectors or name them in another order.
 
-use super::super::VolumeError;
+use super::ReadError;
 use super::attributes::{
     Attribute, Attributes, DETECTOR_VECTOR, ENERGY_WINDOW_VECTOR, FRAME_POINTER, ROTATION_VECTOR,
     RR_INTERVAL_VECTOR, RR_INTERVALS, SLICE_VECTOR, TIME_SLOT_VECTOR,
@@ -24,7 +24,7 @@ const IDLE_VECTORS: [Attribute; 5] = [
 
 /// The stored frames of each gate in the order of its slices.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct FrameOrder {
+pub struct FrameOrder {
     /// Slices of one gate.
     slices: usize,
     /// R-R intervals and time slots.
@@ -41,13 +41,13 @@ impl FrameOrder {
     /// Reads the slice vector of `frames` frames, and the vectors of R-R intervals and time slots if `gated`.
     ///
     /// # Errors
-    /// [`VolumeError::Field`] unless every slice of every gate occurs exactly once.
-    pub(super) fn new(
+    /// [`ReadError::Field`] unless every slice of every gate occurs exactly once.
+    pub fn new(
         attributes: &Attributes,
         frames: usize,
         gated: bool,
         warnings: &mut Vec<String>,
-    ) -> Result<Self, VolumeError> {
+    ) -> Result<Self, ReadError> {
         let vectors: &[Attribute] = if gated {
             &[RR_INTERVAL_VECTOR, TIME_SLOT_VECTOR, SLICE_VECTOR]
         } else {
@@ -119,29 +119,29 @@ impl FrameOrder {
     }
 
     /// Slices of one gate.
-    pub(super) fn slices(&self) -> usize {
+    pub fn slices(&self) -> usize {
         self.slices
     }
 
     /// Number of gates; 1 without gating.
-    pub(super) fn gates(&self) -> usize {
+    pub fn gates(&self) -> usize {
         self.stored.len() / self.slices
     }
 
     /// R-R intervals and time slots; 1 each without gating.
-    pub(super) fn gating(&self) -> [usize; 2] {
+    pub fn gating(&self) -> [usize; 2] {
         self.gating
     }
 
     /// The stored frames of `gate`, from its first slice to its last.
-    pub(super) fn slices_of(&self, gate: usize) -> &[usize] {
+    pub fn slices_of(&self, gate: usize) -> &[usize] {
         &self.stored[gate * self.slices..(gate + 1) * self.slices]
     }
 }
 
 /// Checks that the Frame Increment Pointer, if present, names none but `vectors`. Some writers name further
 /// vectors; those are accepted if all of their numbers are the same.
-fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), VolumeError> {
+fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), ReadError> {
     let pointer = attributes.shorts(FRAME_POINTER);
     let (stated, _) = pointer.as_chunks::<2>();
     let idle = |tag: &[u16; 2]| {
@@ -165,7 +165,7 @@ fn is_constant(numbers: &[u16]) -> bool {
 }
 
 /// The numbers of `vector`, counted from 1; an empty list if it is absent.
-pub(super) fn counted(attributes: &Attributes, vector: Attribute) -> Vec<u16> {
+pub fn counted(attributes: &Attributes, vector: Attribute) -> Vec<u16> {
     let mut numbers = attributes.shorts(vector);
     let least = numbers.iter().copied().min().unwrap_or(1);
     for number in &mut numbers {
@@ -196,7 +196,7 @@ fn numbers(
     attributes: &Attributes,
     vector: Attribute,
     frames: usize,
-) -> Result<Vec<u16>, VolumeError> {
+) -> Result<Vec<u16>, ReadError> {
     let numbers = counted(attributes, vector);
     if numbers.is_empty() {
         let stated = attributes.shorts(RR_INTERVALS).first().copied();

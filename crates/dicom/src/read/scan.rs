@@ -5,19 +5,18 @@
 //! each), skips all others and ends at the pixels. Memory and stack stay bounded whatever
 //! lengths and depths the file states.
 
-use super::super::VolumeError;
-use super::super::facts::ByteOrder;
-use super::super::source::Source;
+use super::ReadError;
 use super::attributes::{Attribute, Attributes, IMAGE_TYPE, clip};
-use super::codec::Compression;
+use super::bytes::Bytes;
 use super::kind::{self, Kind};
 use super::real_world::{Item, MAPPING_NAME, Part, Stated};
 use super::representation;
 use super::syntax::Syntax;
 use super::unknown::UnknownSequences;
-use crate::base::progress::Monitor;
+use crate::codec::Compression;
 use dicom_core::header::DataElementHeader;
 use dicom_core::{Tag, VR};
+use dicom_dictionary_std::tags;
 use dicom_encoding::decode::explicit_be::ExplicitVRBigEndianDecoder;
 use dicom_encoding::decode::explicit_le::ExplicitVRLittleEndianDecoder;
 use dicom_encoding::text::SpecificCharacterSet;
@@ -26,6 +25,7 @@ use dicom_parser::dataset::LazyDataToken;
 use dicom_parser::dataset::lazy_read::LazyDataSetReader;
 use dicom_parser::{DynStatefulDecoder, StatefulDecode, StatefulDecoder};
 use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 
 /// Deepest nesting of sequences that is read.
@@ -42,7 +42,7 @@ const TOKENS_PER_CHECK: usize = 4096;
 
 /// Which element holds the pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum PixelElement {
+pub enum PixelElement {
     /// Pixel Data (7FE0,0010).
     Integer,
     /// Float Pixel Data (7FE0,0008).
@@ -53,7 +53,7 @@ pub(super) enum PixelElement {
 
 /// The needed attributes and the place of the pixels.
 #[derive(Debug)]
-pub(super) struct Scan {
+pub struct Scan {
     /// Values of the needed attributes.
     pub attributes: Attributes,
     /// The kind of the object.
@@ -63,26 +63,33 @@ pub(super) struct Scan {
     /// Whether the value representation of the pixels is OW.
     pub words: bool,
     /// Byte order of the pixels in one piece.
-    pub byte_order: ByteOrder,
+    pub byte_order: Endianness,
     /// Where the pixels are.
     pub pixels: PixelPlace,
 }
 
 /// Where the pixels of a file are. Offsets are those of the unpacked file.
 #[derive(Debug)]
-pub(super) enum PixelPlace {
+pub enum PixelPlace {
     /// In one piece of `length` bytes from byte `begin` on.
-    Whole { begin: u64, length: u64 },
+    Whole {
+        /// Offset of the first byte.
+        begin: u64,
+        /// Length, bytes.
+        length: u64,
+    },
     /// In fragments, of which the first item, the Basic Offset Table, is kept apart.
     Fragments {
+        /// The Basic Offset Table: where each frame begins after it.
         offsets: Vec<u32>,
+        /// The fragments in their order.
         fragments: Vec<Fragment>,
     },
 }
 
 /// A piece of compressed pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Fragment {
+pub struct Fragment {
     /// Offset of its first byte.
     pub begin: u64,
     /// Its length, bytes.
@@ -92,22 +99,22 @@ pub(super) struct Fragment {
 /// Scans the data set that begins at the position of `source`, up to its pixels.
 ///
 /// # Errors
-/// [`VolumeError`] for damaged data sets, stated lengths beyond the file's size, sequences nested
+/// [`ReadError`] for damaged data sets, stated lengths beyond the file's size, sequences nested
 /// deeper than [`MAX_SEQUENCE_DEPTH`], and data sets without pixels.
-pub(super) fn scan(
-    source: &mut Source,
+pub fn scan(
+    source: &mut dyn Bytes,
     syntax: &Syntax,
-    monitor: &Monitor,
-) -> Result<Scan, VolumeError> {
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Scan, ReadError> {
     let mut walk = Walk::new(source, syntax);
-    let found = find_pixels(source, syntax, &mut walk, monitor);
+    let found = walk_to_pixels(source, syntax, &mut walk, goes_on);
     // For another class of object, the class is the more useful error. What else a damaged data set
     // says of itself may be part of the damage.
     let kind = match &found {
-        Err(VolumeError::Cancelled(_)) => None,
+        Err(ReadError::Stopped) => None,
         Err(_) if !walk.attributes.names_a_class() => None,
         Err(_) | Ok(None) => match Kind::from_attributes(&walk.attributes) {
-            Err(other @ VolumeError::NotVolume { .. }) => return Err(other),
+            Err(other @ ReadError::NotVolume { .. }) => return Err(other),
             _ => None,
         },
         Ok(Some(_)) => Some(Kind::from_attributes(&walk.attributes)?),
@@ -134,14 +141,14 @@ pub(super) fn scan(
 ///
 /// # Errors
 /// As [`Kind::from_attributes`]; for one that names no class, as [`attributes`].
-pub(super) fn check_kind(
-    source: &mut Source,
+pub fn check_kind(
+    source: &mut dyn Bytes,
     syntax: &Syntax,
-    monitor: &Monitor,
-) -> Result<(), VolumeError> {
+    goes_on: &dyn Fn() -> bool,
+) -> Result<(), ReadError> {
     let mut walk = Walk::new(source, syntax);
-    match find_pixels(source, syntax, &mut walk, monitor) {
-        Err(error @ VolumeError::Cancelled(_)) => Err(error),
+    match walk_to_pixels(source, syntax, &mut walk, goes_on) {
+        Err(error @ ReadError::Stopped) => Err(error),
         _ if walk.attributes.names_a_class() => Kind::from_attributes(&walk.attributes).map(|_| ()),
         found => found.map(|_| ()),
     }
@@ -151,13 +158,13 @@ pub(super) fn check_kind(
 ///
 /// # Errors
 /// As [`scan`], except that neither the kind of object nor pixels are asked for.
-pub(super) fn attributes(
-    source: &mut Source,
+pub fn attributes(
+    source: &mut dyn Bytes,
     syntax: &Syntax,
-    monitor: &Monitor,
-) -> Result<Attributes, VolumeError> {
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Attributes, ReadError> {
     let mut walk = Walk::new(source, syntax);
-    find_pixels(source, syntax, &mut walk, monitor)?;
+    walk_to_pixels(source, syntax, &mut walk, goes_on)?;
     Ok(walk.attributes)
 }
 
@@ -165,21 +172,41 @@ pub(super) fn attributes(
 struct Found {
     element: PixelElement,
     words: bool,
-    byte_order: ByteOrder,
+    byte_order: Endianness,
     pixels: PixelPlace,
+}
+
+/// As [`find_pixels`]. The parser states invariants of its own by panics, which are errors of the file.
+fn walk_to_pixels(
+    source: &mut dyn Bytes,
+    syntax: &Syntax,
+    walk: &mut Walk,
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Found>, ReadError> {
+    let file = source.file().to_owned();
+    let found = catch_unwind(AssertUnwindSafe(|| {
+        find_pixels(source, syntax, walk, goes_on)
+    }));
+    found.unwrap_or_else(|_| {
+        Err(ReadError::Corrupt {
+            file,
+            byte: 0,
+            reason: "the data set's structure contradicts itself".into(),
+        })
+    })
 }
 
 /// Walks through the data set up to its pixels; `None` if there are none.
 fn find_pixels(
-    source: &mut Source,
+    source: &mut dyn Bytes,
     syntax: &Syntax,
     walk: &mut Walk,
-    monitor: &Monitor,
-) -> Result<Option<Found>, VolumeError> {
+    goes_on: &dyn Fn() -> bool,
+) -> Result<Option<Found>, ReadError> {
     let file = source.file().to_owned();
     let capacity = source.capacity();
     let ts = syntax.transfer_syntax;
-    let damaged = |byte: u64, e: &dyn std::fmt::Display| VolumeError::Corrupt {
+    let damaged = |byte: u64, e: &dyn std::fmt::Display| ReadError::Corrupt {
         file: file.clone(),
         byte,
         reason: e.to_string(),
@@ -195,8 +222,8 @@ fn find_pixels(
     let mut byte = start;
     while let Some(token) = reader.advance() {
         tokens += 1;
-        if tokens.is_multiple_of(TOKENS_PER_CHECK) {
-            monitor.check()?;
+        if tokens.is_multiple_of(TOKENS_PER_CHECK) && !goes_on() {
+            return Err(ReadError::Stopped);
         }
         match token.map_err(|e| damaged(byte, &e))? {
             LazyDataToken::ElementHeader(_) => {}
@@ -207,7 +234,7 @@ fn find_pixels(
                     return Err(damaged(byte, &element));
                 };
                 if length > capacity.saturating_sub(byte) {
-                    return Err(VolumeError::Truncated {
+                    return Err(ReadError::Truncated {
                         file,
                         needed: byte.saturating_add(length),
                         found: capacity,
@@ -228,7 +255,7 @@ fn find_pixels(
                         element,
                         words: header.vr == VR::OW,
                         byte_order: if walk.little.get() {
-                            ByteOrder::Little
+                            Endianness::Little
                         } else {
                             walk.attributes.byte_order
                         },
@@ -245,7 +272,7 @@ fn find_pixels(
                 byte = decoder.position();
                 let end = byte.saturating_add(u64::from(len));
                 if end > capacity {
-                    return Err(VolumeError::Truncated {
+                    return Err(ReadError::Truncated {
                         file,
                         needed: end,
                         found: capacity,
@@ -299,7 +326,7 @@ fn find_pixels(
     Ok(pieces.map(|pieces| Found {
         element: PixelElement::Integer,
         words: false,
-        byte_order: ByteOrder::Little,
+        byte_order: Endianness::Little,
         pixels: PixelPlace::Fragments {
             offsets: pieces.offsets,
             fragments: pieces.fragments,
@@ -310,12 +337,12 @@ fn find_pixels(
 /// A decoder of what follows in `source`. In explicit VR, `little` becomes what says of every header whether
 /// its value is in Little Endian whatever the file is in.
 fn decoder<'a>(
-    source: &'a mut Source,
+    source: &'a mut (dyn Bytes + 'a),
     syntax: &Syntax,
     little: &mut Rc<Cell<bool>>,
-) -> dicom_parser::stateful::decode::Result<DynStatefulDecoder<&'a mut Source>> {
+) -> dicom_parser::stateful::decode::Result<DynStatefulDecoder<&'a mut (dyn Bytes + 'a)>> {
     let (ts, start) = (syntax.transfer_syntax, source.position());
-    let headers: DynDecoder<&'a mut Source> = if syntax.is_implicit() {
+    let headers: DynDecoder<&'a mut (dyn Bytes + 'a)> = if syntax.is_implicit() {
         return DynStatefulDecoder::new_with_ts(source, ts, start);
     } else if ts.endianness() == Endianness::Big {
         let headers = UnknownSequences::<ExplicitVRBigEndianDecoder>::default();
@@ -387,11 +414,8 @@ struct Walk {
 
 impl Walk {
     /// At the start of the data set of `source`.
-    fn new(source: &Source, syntax: &Syntax) -> Self {
-        let byte_order = match syntax.transfer_syntax.endianness() {
-            Endianness::Little => ByteOrder::Little,
-            Endianness::Big => ByteOrder::Big,
-        };
+    fn new(source: &dyn Bytes, syntax: &Syntax) -> Self {
+        let byte_order = syntax.transfer_syntax.endianness();
         let mut attributes = Attributes::new(source.file(), byte_order);
         attributes.media_class.clone_from(&syntax.media_class);
         Self {
@@ -401,7 +425,7 @@ impl Walk {
         }
     }
 
-    fn enter(&mut self, tag: Tag) -> Result<(), VolumeError> {
+    fn enter(&mut self, tag: Tag) -> Result<(), ReadError> {
         self.path.push((tag, 0));
         if self.path.len() > MAX_SEQUENCE_DEPTH {
             Err(self.attributes.wrong(
@@ -427,9 +451,9 @@ impl Walk {
     /// The kind of pixels if `header` belongs to a pixel element.
     fn pixels(&self, header: &DataElementHeader) -> Option<PixelElement> {
         match (self.path.is_empty(), header.tag) {
-            (true, Tag(0x7fe0, 0x0010)) => Some(PixelElement::Integer),
-            (true, Tag(0x7fe0, 0x0008)) => Some(PixelElement::Float),
-            (true, Tag(0x7fe0, 0x0009)) => Some(PixelElement::Double),
+            (true, tags::PIXEL_DATA) => Some(PixelElement::Integer),
+            (true, tags::FLOAT_PIXEL_DATA) => Some(PixelElement::Float),
+            (true, tags::DOUBLE_FLOAT_PIXEL_DATA) => Some(PixelElement::Double),
             _ => None,
         }
     }
@@ -440,7 +464,7 @@ impl Walk {
         header: &DataElementHeader,
         length: u64,
         decoder: &mut D,
-    ) -> Result<dicom_parser::stateful::decode::Result<()>, VolumeError> {
+    ) -> Result<dicom_parser::stateful::decode::Result<()>, ReadError> {
         // The caller has checked that the length comes from a 32-bit field.
         let bytes = length as u32;
         if let Some((item, part)) = Item::find(&self.path, header.tag) {
@@ -507,7 +531,7 @@ impl Walk {
         header: &DataElementHeader,
         length: u64,
         decoder: &mut D,
-    ) -> Result<dicom_parser::stateful::decode::Result<()>, VolumeError> {
+    ) -> Result<dicom_parser::stateful::decode::Result<()>, ReadError> {
         let bytes = length as u32;
         if !self.attributes.mappings.has_room() {
             let reason = "the file describes more frames than are read".into();

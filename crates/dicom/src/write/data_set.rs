@@ -1,7 +1,6 @@
 //! A data set under construction, over `dicom-object`.
 
-use super::DicomError;
-use crate::results::figures::code::Code;
+use super::code::Code;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
@@ -14,22 +13,34 @@ pub const IMPLEMENTATION_CLASS_UID: &str = "2.25.2120463033912680934114183053111
 /// Implementation Version Name (0002,0013) of this software.
 pub const IMPLEMENTATION_NAME: &str = "VENTRIFORM";
 
+/// Why a data set cannot be encoded.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the data set cannot be encoded: {0}")]
+pub struct EncodingError(pub String);
+
 /// Elements by tag. The value representation of an attribute is the dictionary's.
 #[derive(Debug, Clone)]
-pub(super) struct DataSet(InMemDicomObject);
+pub struct DataSet(InMemDicomObject);
+
+impl Default for DataSet {
+    fn default() -> Self {
+        Self(InMemDicomObject::new_empty())
+    }
+}
 
 impl DataSet {
-    pub(super) fn new() -> Self {
-        Self(InMemDicomObject::new_empty())
+    /// No elements yet.
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Puts a value whose representation the dictionary does not decide.
-    pub(super) fn put(&mut self, tag: Tag, vr: VR, value: PrimitiveValue) {
+    pub fn put(&mut self, tag: Tag, vr: VR, value: PrimitiveValue) {
         self.0.put(DataElement::new(tag, vr, value));
     }
 
     /// Puts text; backslashes separate several values. Empty text gives an empty element.
-    pub(super) fn text(&mut self, tag: Tag, text: impl Into<String>) {
+    pub fn text(&mut self, tag: Tag, text: impl Into<String>) {
         let text = text.into();
         let value = if text.is_empty() {
             PrimitiveValue::Empty
@@ -40,34 +51,34 @@ impl DataSet {
     }
 
     /// Puts text, or an empty element for `None`.
-    pub(super) fn stated(&mut self, tag: Tag, text: Option<&str>) {
+    pub fn stated(&mut self, tag: Tag, text: Option<&str>) {
         self.text(tag, text.unwrap_or_default());
     }
 
     /// Puts text unless there is none.
-    pub(super) fn known(&mut self, tag: Tag, text: Option<&str>) {
+    pub fn known(&mut self, tag: Tag, text: Option<&str>) {
         if let Some(text) = text.filter(|text| !text.is_empty()) {
             self.text(tag, text);
         }
     }
 
     /// Puts an empty element.
-    pub(super) fn empty(&mut self, tag: Tag) {
+    pub fn empty(&mut self, tag: Tag) {
         self.put(tag, representation(tag), PrimitiveValue::Empty);
     }
 
     /// Puts a 16-bit number.
-    pub(super) fn short(&mut self, tag: Tag, number: u16) {
+    pub fn short(&mut self, tag: Tag, number: u16) {
         self.put(tag, VR::US, PrimitiveValue::from(number));
     }
 
     /// Puts 16-bit numbers.
-    pub(super) fn shorts(&mut self, tag: Tag, numbers: &[u16]) {
+    pub fn shorts(&mut self, tag: Tag, numbers: &[u16]) {
         self.put(tag, VR::US, PrimitiveValue::U16(numbers.into()));
     }
 
     /// Puts 32-bit numbers.
-    pub(super) fn longs(&mut self, tag: Tag, numbers: Vec<u32>) {
+    pub fn longs(&mut self, tag: Tag, numbers: Vec<u32>) {
         self.put(
             tag,
             representation(tag),
@@ -76,7 +87,7 @@ impl DataSet {
     }
 
     /// Puts numbers of single precision.
-    pub(super) fn floats(&mut self, tag: Tag, numbers: Vec<f32>) {
+    pub fn floats(&mut self, tag: Tag, numbers: Vec<f32>) {
         self.put(
             tag,
             representation(tag),
@@ -85,12 +96,12 @@ impl DataSet {
     }
 
     /// Puts the tag of another attribute.
-    pub(super) fn tag(&mut self, tag: Tag, named: Tag) {
+    pub fn tag(&mut self, tag: Tag, named: Tag) {
         self.put(tag, VR::AT, PrimitiveValue::from(named));
     }
 
     /// Puts bytes, padded to an even number.
-    pub(super) fn bytes(&mut self, tag: Tag, mut bytes: Vec<u8>) {
+    pub fn bytes(&mut self, tag: Tag, mut bytes: Vec<u8>) {
         if bytes.len() % 2 == 1 {
             bytes.push(0);
         }
@@ -98,25 +109,25 @@ impl DataSet {
     }
 
     /// Puts decimal numbers.
-    pub(super) fn decimals(&mut self, tag: Tag, numbers: &[f64]) {
+    pub fn decimals(&mut self, tag: Tag, numbers: &[f64]) {
         let texts: Vec<String> = numbers.iter().map(|x| decimal(*x)).collect();
         self.text(tag, texts.join("\\"));
     }
 
     /// Puts a sequence.
-    pub(super) fn items(&mut self, tag: Tag, items: Vec<DataSet>) {
+    pub fn items(&mut self, tag: Tag, items: Vec<DataSet>) {
         let items: Vec<InMemDicomObject> = items.into_iter().map(|item| item.0).collect();
         let sequence = DataSetSequence::from(items);
         self.0.put(DataElement::new(tag, VR::SQ, sequence));
     }
 
     /// Puts a sequence with one item.
-    pub(super) fn item(&mut self, tag: Tag, item: DataSet) {
+    pub fn item(&mut self, tag: Tag, item: DataSet) {
         self.items(tag, vec![item]);
     }
 
     /// Puts a sequence with one coded concept.
-    pub(super) fn code(&mut self, tag: Tag, code: Code) {
+    pub fn code(&mut self, tag: Tag, code: Code) {
         let mut item = DataSet::new();
         item.text(tags::CODE_VALUE, code.value);
         item.text(tags::CODING_SCHEME_DESIGNATOR, code.scheme);
@@ -127,8 +138,8 @@ impl DataSet {
     /// The data set as a file, Explicit VR Little Endian.
     ///
     /// # Errors
-    /// [`DicomError::Encoding`].
-    pub(super) fn file(self) -> Result<Vec<u8>, DicomError> {
+    /// [`EncodingError`].
+    pub fn file(self) -> Result<Vec<u8>, EncodingError> {
         let meta = FileMetaTableBuilder::new()
             .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
             .implementation_class_uid(IMPLEMENTATION_CLASS_UID)
@@ -143,12 +154,12 @@ impl DataSet {
 /// Preamble and File Meta Information (PS3.10, 7.1) of an object that follows as a data set.
 ///
 /// # Errors
-/// [`DicomError::Encoding`] if a UID is too long.
+/// [`EncodingError`] if a UID is too long.
 pub fn file_start(
     sop_class: &str,
     sop_instance: &str,
     transfer_syntax: &str,
-) -> Result<Vec<u8>, DicomError> {
+) -> Result<Vec<u8>, EncodingError> {
     let meta = FileMetaTableBuilder::new()
         .media_storage_sop_class_uid(sop_class)
         .media_storage_sop_instance_uid(sop_instance)
@@ -163,8 +174,8 @@ pub fn file_start(
     Ok(bytes)
 }
 
-fn encoding(error: impl std::error::Error) -> DicomError {
-    DicomError::Encoding(error.to_string())
+fn encoding(error: impl std::error::Error) -> EncodingError {
+    EncodingError(error.to_string())
 }
 
 /// The value representation of a standard attribute.
@@ -174,7 +185,7 @@ fn representation(tag: Tag) -> VR {
 }
 
 /// A decimal string (DS): at most 16 characters, as many digits as they hold.
-pub(super) fn decimal(number: f64) -> String {
+fn decimal(number: f64) -> String {
     const MAX_TEXT_CHARS: usize = 16;
     let number = number + 0.0;
     let shortest = format!("{number}");
@@ -193,9 +204,34 @@ pub(super) fn decimal(number: f64) -> String {
 }
 
 /// The item that refers to an instance, in the form of the SOP Instance Reference Macro.
-pub(super) fn reference(class: &str, instance: &str) -> DataSet {
+pub fn reference(class: &str, instance: &str) -> DataSet {
     let mut item = DataSet::new();
     item.text(tags::REFERENCED_SOP_CLASS_UID, class);
     item.text(tags::REFERENCED_SOP_INSTANCE_UID, instance);
     item
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_have_sixteen_characters_at_most() {
+        for (number, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (3.5, "3.5"),
+            (-123.456_789_012_345_67, "-123.45678901235"),
+            (1.0 / 3.0, "0.33333333333333"),
+            (-1.234_567_890_123e-9, "-1.23456789012e-9"),
+        ] {
+            let shown = decimal(number);
+            assert!(shown.len() <= 16);
+            let read: f64 = shown.parse().unwrap();
+            assert!(
+                (read - number).abs() <= 1e-9 * number.abs().max(1e-3),
+                "{text}: {shown}"
+            );
+        }
+    }
 }

@@ -5,10 +5,10 @@
 //! is. Numbers are converted between binary forms and text if the attribute's VR can hold them exactly;
 //! otherwise the value is refused, because its bytes mean another number when they are read as they are.
 
-use super::super::facts::ByteOrder;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::StandardDataDictionary;
+use dicom_encoding::transfer_syntax::Endianness;
 
 /// What the bytes of a value are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,7 +115,7 @@ impl Form {
 }
 
 /// The VR that the standard gives an attribute.
-pub(super) fn standard(tag: Tag) -> VR {
+pub fn standard(tag: Tag) -> VR {
     let entry = StandardDataDictionary.by_tag(tag);
     entry.map_or(VR::UN, |entry| entry.vr().relaxed())
 }
@@ -126,11 +126,11 @@ pub(super) fn standard(tag: Tag) -> VR {
 ///
 /// # Errors
 /// The representation that is expected, if the value cannot be converted.
-pub(super) fn settled(
+pub fn settled(
     tag: Tag,
     stated: VR,
     mut value: Vec<u8>,
-    order: ByteOrder,
+    order: Endianness,
     little: bool,
 ) -> Result<(Vec<u8>, bool), VR> {
     let own = standard(tag);
@@ -143,7 +143,7 @@ pub(super) fn settled(
             word.reverse();
         }
     };
-    let is_big = order == ByteOrder::Big;
+    let is_big = order == Endianness::Big;
     if from.word() == to.word() && (from == Form::Text) == (to == Form::Text)
         || from == Form::Plain
         || to == Form::Plain
@@ -184,8 +184,8 @@ mod tests {
         for word in big.chunks_exact_mut(word) {
             word.reverse();
         }
-        let found = settled(tag, stated, little.to_vec(), ByteOrder::Little, false);
-        let mut other = settled(tag, stated, big, ByteOrder::Big, false);
+        let found = settled(tag, stated, little.to_vec(), Endianness::Little, false);
+        let mut other = settled(tag, stated, big, Endianness::Big, false);
         if let Ok((bytes, _)) = &mut other {
             for word in bytes.chunks_exact_mut(Form::from_representation(standard(tag)).word()) {
                 word.reverse();
@@ -238,11 +238,11 @@ mod tests {
     fn values_of_unknown_representation_are_little_endian() {
         for stated in [VR::UN, VR::OB, VR::US] {
             let value = 64_u16.to_le_bytes().to_vec();
-            let found = settled(ROWS, stated, value, ByteOrder::Big, true);
+            let found = settled(ROWS, stated, value, Endianness::Big, true);
             assert_eq!(found, Ok((64_u16.to_be_bytes().to_vec(), false)));
         }
         let text = b"6.4\\4.8".to_vec();
-        let found = settled(SPACING, VR::UN, text.clone(), ByteOrder::Big, true);
+        let found = settled(SPACING, VR::UN, text.clone(), Endianness::Big, true);
         assert_eq!(found, Ok((text, false)));
     }
 }

@@ -5,14 +5,14 @@ use sha2::{Digest, Sha256};
 
 /// Identifiers of the objects of one result.
 #[derive(Debug, Clone)]
-pub(super) struct Uids {
+pub struct Uids {
     seed: [u8; 32],
 }
 
 impl Uids {
     /// Identifiers that depend on everything that decides the bytes of the objects: `fill` passes
     /// it on, piece by piece.
-    pub(super) fn over_all(fill: impl FnOnce(&mut dyn FnMut(&[u8]))) -> Self {
+    pub fn over_all(fill: impl FnOnce(&mut dyn FnMut(&[u8]))) -> Self {
         let mut hash = Sha256::new();
         fill(&mut |bytes| {
             hash.update((bytes.len() as u64).to_le_bytes());
@@ -24,18 +24,18 @@ impl Uids {
     }
 
     /// The identifier called `name`.
-    pub(super) fn uid(&self, name: &str) -> String {
+    pub fn uid(&self, name: &str) -> String {
         self.over(name, &[])
     }
 
     /// The identifier called `name` of an object with further `content`.
-    pub(super) fn over(&self, name: &str, content: &[u8]) -> String {
+    pub fn over(&self, name: &str, content: &[u8]) -> String {
         derived(&[&self.seed, name.as_bytes(), content])
     }
 }
 
 /// The identifier that belongs to `parts`.
-pub(super) fn derived(parts: &[&[u8]]) -> String {
+pub fn derived(parts: &[&[u8]]) -> String {
     let mut hash = Sha256::new();
     for part in parts {
         hash.update((part.len() as u64).to_le_bytes());
@@ -52,7 +52,7 @@ pub(super) fn derived(parts: &[&[u8]]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::volume::is_uid;
+    use crate::values::is_uid;
 
     #[test]
     fn identifiers_are_valid_and_depend_on_every_part() {

@@ -9,19 +9,16 @@
 //! that is read ([`is_path`]) and begins as a sequence does; otherwise it stays bytes. Some writers keep the
 //! items in Explicit VR: those whose first element has the VR that the dictionary gives it.
 
-use super::super::source::Source;
 use super::attributes::is_path;
+use super::bytes::Bytes;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::header::{DataElementHeader, Length, SequenceItemHeader};
 use dicom_core::{Tag, VR};
-use dicom_dictionary_std::StandardDataDictionary;
+use dicom_dictionary_std::{StandardDataDictionary, tags};
 use dicom_encoding::decode::implicit_le::StandardImplicitVRLittleEndianDecoder;
 use dicom_encoding::decode::{DecodeFrom, Result};
 use std::cell::Cell;
 use std::rc::Rc;
-
-/// Pixel Data: its undefined length means fragments.
-const PIXEL_DATA: Tag = Tag(0x7fe0, 0x0010);
 
 /// Group of items and their delimiters, which have no VR.
 const ITEM_GROUP: u16 = 0xfffe;
@@ -32,9 +29,12 @@ const ITEM_START: [u8; 4] = [0xfe, 0xff, 0x00, 0xe0];
 /// Bytes that show how the items of a sequence are encoded: an item's header, a tag and a VR.
 const EXAMINED_BYTES: usize = 14;
 
+/// What elements are decoded from.
+type Input<'a> = &'a mut (dyn Bytes + 'a);
+
 /// A decoder of headers in Explicit VR that reads elements of unknown representation too.
 #[derive(Default)]
-pub(super) struct UnknownSequences<D> {
+pub struct UnknownSequences<D> {
     explicit: D,
     implicit: StandardImplicitVRLittleEndianDecoder,
     place: Cell<Place>,
@@ -63,7 +63,7 @@ enum Items {
 
 impl<D> UnknownSequences<D> {
     /// Whether the value of the header that was read last is in Little Endian whatever the file is in.
-    pub(super) fn little(&self) -> Rc<Cell<bool>> {
+    pub fn little(&self) -> Rc<Cell<bool>> {
         Rc::clone(&self.little)
     }
 
@@ -77,7 +77,7 @@ impl<D> UnknownSequences<D> {
     }
 
     /// The header of an element of unknown representation, whose value begins at the position of `source`.
-    fn unknown(&self, header: DataElementHeader, source: &mut Source) -> DataElementHeader {
+    fn unknown(&self, header: DataElementHeader, source: &mut dyn Bytes) -> DataElementHeader {
         let Some(length) = header.len.get() else {
             if items(source) != Items::Explicit {
                 self.place.set(Place::Open(1));
@@ -111,7 +111,7 @@ fn is_sequence(tag: Tag) -> bool {
 }
 
 /// How the items that follow in `source` are encoded, as far as their beginning shows it.
-fn items(source: &mut Source) -> Items {
+fn items(source: &mut dyn Bytes) -> Items {
     let start = source.peek(EXAMINED_BYTES).unwrap_or_default();
     if !start.starts_with(&ITEM_START) {
         return Items::None;
@@ -132,19 +132,20 @@ fn items(source: &mut Source) -> Items {
     }
 }
 
-impl<'a, D: DecodeFrom<&'a mut Source>> DecodeFrom<&'a mut Source> for UnknownSequences<D> {
-    fn decode_header(&self, source: &mut &'a mut Source) -> Result<(DataElementHeader, usize)> {
+impl<'a, D: DecodeFrom<Input<'a>>> DecodeFrom<Input<'a>> for UnknownSequences<D> {
+    fn decode_header(&self, source: &mut Input<'a>) -> Result<(DataElementHeader, usize)> {
         self.settle(source.position());
         let place = self.place.get();
         if place == Place::Outside {
             let (header, read) = self.explicit.decode_header(source)?;
             let unknown = header.vr == VR::UN && header.tag.group() != ITEM_GROUP;
             self.little.set(unknown);
-            let encapsulated = header.tag == PIXEL_DATA && header.len.is_undefined();
+            // Its undefined length means fragments.
+            let encapsulated = header.tag == tags::PIXEL_DATA && header.len.is_undefined();
             if !unknown || encapsulated {
                 return Ok((header, read));
             }
-            return Ok((self.unknown(header, source), read));
+            return Ok((self.unknown(header, &mut **source), read));
         }
         let (header, read) = DecodeFrom::decode_header(&self.implicit, source)?;
         self.little.set(true);
@@ -156,7 +157,7 @@ impl<'a, D: DecodeFrom<&'a mut Source>> DecodeFrom<&'a mut Source> for UnknownSe
         Ok((header, read))
     }
 
-    fn decode_item_header(&self, source: &mut &'a mut Source) -> Result<SequenceItemHeader> {
+    fn decode_item_header(&self, source: &mut Input<'a>) -> Result<SequenceItemHeader> {
         self.settle(source.position());
         match self.place.get() {
             Place::Outside => self.explicit.decode_item_header(source),
@@ -174,7 +175,7 @@ impl<'a, D: DecodeFrom<&'a mut Source>> DecodeFrom<&'a mut Source> for UnknownSe
         }
     }
 
-    fn decode_tag(&self, source: &mut &'a mut Source) -> Result<Tag> {
+    fn decode_tag(&self, source: &mut Input<'a>) -> Result<Tag> {
         self.settle(source.position());
         match self.place.get() {
             Place::Outside => self.explicit.decode_tag(source),

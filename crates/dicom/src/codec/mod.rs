@@ -24,21 +24,20 @@ mod jpeg_2000;
 mod jpeg_ls;
 mod rle;
 
-pub(super) use jpeg::Process;
+pub use jpeg::Process;
 
-use crate::base::progress::Cancelled;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Most pixels of a compressed frame. Slices have at most 1024 columns and rows; decoders take up to
 /// 40 bytes per pixel.
-pub(super) const MOST_PIXELS: usize = 1 << 20;
+pub const MOST_PIXELS: usize = 1 << 20;
 
 /// Pixels decoded between two reports: a few milliseconds of work.
 const PIXELS_PER_REPORT: usize = 1 << 14;
 
 /// The compression of stored pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Compression {
+pub enum Compression {
     /// Not at all.
     None,
     /// Run lengths, PS3.5 annex G.
@@ -46,15 +45,23 @@ pub(super) enum Compression {
     /// JPEG (ISO 10918-1): baseline, or lossless with any predictor.
     Jpeg(Process),
     /// JPEG-LS (ISO 14495-1), near-lossless or only lossless.
-    JpegLs { near: bool },
+    JpegLs {
+        /// Whether near-lossless frames are allowed.
+        near: bool,
+    },
     /// JPEG 2000 (ISO 15444-1), irreversible or only reversible.
-    Jpeg2000 { irreversible: bool },
+    Jpeg2000 {
+        /// Whether irreversible frames are allowed.
+        irreversible: bool,
+    },
 }
 
 /// Layout of a decoded frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FrameLayout {
+pub struct FrameLayout {
+    /// Pixels of a row.
     pub columns: usize,
+    /// Rows.
     pub rows: usize,
     /// Bytes of a stored number: 1, 2 or 4.
     pub size: usize,
@@ -66,11 +73,11 @@ pub(super) struct FrameLayout {
 
 /// Why a frame was not decoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum FrameError {
+pub enum FrameError {
     /// Its bytes are wrong or not supported.
     Wrong(String),
     /// The caller stopped it.
-    Cancelled(Cancelled),
+    Stopped,
 }
 
 impl From<String> for FrameError {
@@ -85,26 +92,22 @@ impl From<&str> for FrameError {
     }
 }
 
-impl From<Cancelled> for FrameError {
-    fn from(cancelled: Cancelled) -> Self {
-        Self::Cancelled(cancelled)
-    }
-}
-
 /// Asks the caller regularly whether to go on.
 struct Pace<'a> {
-    report: &'a mut dyn FnMut() -> Result<(), Cancelled>,
+    goes_on: &'a mut dyn FnMut() -> bool,
     left: usize,
 }
 
 impl Pace<'_> {
     /// Counts `pixels` that are decoded.
-    fn step(&mut self, pixels: usize) -> Result<(), Cancelled> {
+    fn step(&mut self, pixels: usize) -> Result<(), FrameError> {
         match self.left.checked_sub(pixels) {
             Some(left) => self.left = left,
             None => {
                 self.left = PIXELS_PER_REPORT;
-                (self.report)()?;
+                if !(self.goes_on)() {
+                    return Err(FrameError::Stopped);
+                }
             }
         }
         Ok(())
@@ -196,17 +199,17 @@ impl FrameLayout {
     }
 }
 
-/// Decodes the frame in `bytes`. `report` is called regularly.
+/// Decodes the frame in `bytes`. `goes_on` is called regularly, and stops it by `false`.
 ///
 /// # Errors
-/// The problem of the bytes, or that `report` stopped it.
-pub(super) fn decode(
+/// The problem of the bytes, or that it was stopped.
+pub fn decode(
     compression: Compression,
     bytes: &[u8],
     layout: FrameLayout,
-    report: &mut dyn FnMut() -> Result<(), Cancelled>,
+    goes_on: &mut dyn FnMut() -> bool,
 ) -> Result<Vec<u8>, FrameError> {
-    let mut pace = Pace { report, left: 0 };
+    let mut pace = Pace { goes_on, left: 0 };
     let decoded = catch_unwind(AssertUnwindSafe(|| -> Result<Vec<u8>, FrameError> {
         pace.step(1)?;
         let numbers = match compression {

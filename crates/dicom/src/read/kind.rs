@@ -1,6 +1,6 @@
 //! The kind of a DICOM object, and advice on what to send instead of one that holds no volume.
 
-use super::super::VolumeError;
+use super::ReadError;
 use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SERIES_TYPE, SOP_CLASS, UNITS, clip};
 use dicom_core::dictionary::{UidDictionary, UidDictionaryEntry};
 use dicom_dictionary_std::StandardSopClassDictionary;
@@ -12,7 +12,7 @@ const READABLE_ADVICE: &str = "Send reconstructed slices: a multi-frame NM image
 
 /// The objects that hold slices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     /// Nuclear Medicine Image with the Image Type RECON TOMO or RECON GATED TOMO: the frames are
     /// ordered by vectors.
     Nuclear {
@@ -49,25 +49,25 @@ const READ_CLASSES: [(&str, Kind); 13] = [
 const STORAGE_UID_PREFIX: &str = "1.2.840.10008.5.1.4.1.1.";
 
 /// UIDs of the SOP classes that can hold slices.
-pub(super) fn classes() -> impl Iterator<Item = String> {
+pub fn classes() -> impl Iterator<Item = String> {
     READ_CLASSES
         .iter()
         .map(|(suffix, _)| format!("{STORAGE_UID_PREFIX}{suffix}"))
 }
 
 /// Whether an object of that SOP class is one slice of a series.
-pub(super) fn is_slice_class(class: &str) -> bool {
+pub fn is_slice_class(class: &str) -> bool {
     let suffix = class.strip_prefix(STORAGE_UID_PREFIX).unwrap_or_default();
     READ_CLASSES.contains(&(suffix, Kind::Slice))
 }
 
 /// Whether the object is a CT image.
-pub(super) fn is_ct(attributes: &Attributes) -> bool {
+pub fn is_ct(attributes: &Attributes) -> bool {
     is_of(attributes, &["2", "2.1", "2.2"])
 }
 
 /// Whether the object is a Nuclear Medicine image.
-pub(super) fn is_nuclear(attributes: &Attributes) -> bool {
+pub fn is_nuclear(attributes: &Attributes) -> bool {
     is_of(attributes, &["20", "5"])
 }
 
@@ -122,14 +122,14 @@ impl Kind {
     /// The kind of the object with `attributes`.
     ///
     /// # Errors
-    /// [`VolumeError::NotVolume`] for objects that hold no slices, [`VolumeError::NotSlices`] for
+    /// [`ReadError::NotVolume`] for objects that hold no slices, [`ReadError::NotSlices`] for
     /// images whose Image Type says so.
-    pub(super) fn from_attributes(attributes: &Attributes) -> Result<Self, VolumeError> {
+    pub fn from_attributes(attributes: &Attributes) -> Result<Self, ReadError> {
         let class = attributes.text(SOP_CLASS);
         let class = class.or_else(|| attributes.media_class.clone());
         let image_type = attributes.texts(IMAGE_TYPE);
         let refuse = |found: String, reason: &'static str| {
-            Err(VolumeError::NotVolume {
+            Err(ReadError::NotVolume {
                 file: attributes.file.clone(),
                 found,
                 reason,
@@ -186,7 +186,7 @@ impl Kind {
     }
 
     /// What an object of this kind is called.
-    pub(super) fn noun(self) -> &'static str {
+    pub fn noun(self) -> &'static str {
         match self {
             Self::Nuclear { .. } => "a Nuclear Medicine image",
             Self::Slice => "a slice of a PET, CT or MR series",
@@ -196,14 +196,14 @@ impl Kind {
     }
 
     /// Whether each file holds one slice.
-    pub(super) fn is_single_slice(self) -> bool {
+    pub fn is_single_slice(self) -> bool {
         self == Self::Slice
     }
 }
 
 /// The values of an Image Type that were written as one text: a list with brackets, quotes or commas as programming
 /// languages print it. `None` for anything else.
-pub(super) fn unlisted(image_type: &str) -> Option<String> {
+pub fn unlisted(image_type: &str) -> Option<String> {
     const FIRST_VALUES: [&str; 2] = ["ORIGINAL", "DERIVED"];
     let text = image_type.trim_matches(['\0', ' ']);
     if text.contains('\\') {
@@ -223,7 +223,7 @@ pub(super) fn unlisted(image_type: &str) -> Option<String> {
 }
 
 /// Refuses PET, CT and MR images that hold something else than slices of the scan.
-fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), VolumeError> {
+fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), ReadError> {
     let others = [
         (
             "LOCALIZER",
@@ -243,7 +243,7 @@ fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), Vo
     ];
     for (value, reason, fix) in others {
         if image_type.iter().any(|given| given == value) {
-            return Err(VolumeError::NotSlices {
+            return Err(ReadError::NotSlices {
                 file: attributes.file.clone(),
                 image_type: value.into(),
                 reason,
@@ -252,7 +252,7 @@ fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), Vo
         }
     }
     let refuse = |found: String, reason| {
-        Err(VolumeError::NotVolume {
+        Err(ReadError::NotVolume {
             file: attributes.file.clone(),
             found,
             reason,
@@ -274,7 +274,7 @@ fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), Vo
 }
 
 /// The kind of a Nuclear Medicine Image by value 3 of its Image Type.
-fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, VolumeError> {
+fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, ReadError> {
     if image_type.is_empty() {
         return Err(attributes.missing(IMAGE_TYPE));
     }
@@ -286,7 +286,7 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, Volum
         shown.to_owned()
     };
     let refuse = |reason| {
-        Err(VolumeError::NotSlices {
+        Err(ReadError::NotSlices {
             file: attributes.file.clone(),
             image_type: clip(&named),
             reason,

@@ -18,7 +18,7 @@ use bits::{Bits, Table};
 
 /// The process that a transfer syntax allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum Process {
+pub enum Process {
     /// Baseline DCT, process 1.
     Baseline,
     /// Lossless with Huffman codes, process 14.

@@ -7,17 +7,21 @@
 //! The first element of the data set shows its encoding. A transfer syntax that contradicts it is an
 //! error of its own, because whatever is read by the wrong one makes no sense.
 
-use super::super::VolumeError;
-use super::super::limits::ReadLimits;
-use super::super::source::{Source, VolumeFile};
+use super::ReadError;
 use super::attributes::clip;
-use super::codec::{Compression, Process};
+use crate::codec::{Compression, Process};
 use dicom_encoding::transfer_syntax::{Endianness, TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
+use flate2::read::DeflateDecoder;
 use std::fmt;
+use std::io::Read;
 
 /// Group 0002 must end within this many bytes.
 const META_REACH: usize = 64 * 1024;
+
+/// Bytes at the beginning of a file that show its encoding: group 0002, and enough of a deflated data set for its
+/// first element.
+pub const START_BYTES: usize = META_REACH + 4096;
 
 const IMPLICIT_LITTLE: &str = "1.2.840.10008.1.2";
 const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
@@ -26,8 +30,8 @@ const EXPLICIT_BIG: &str = "1.2.840.10008.1.2.2";
 /// Deflated Explicit VR Little Endian, the only transfer syntax that compresses whole data sets.
 const DEFLATED_UID: &str = "1.2.840.10008.1.2.1.99";
 
-/// The transfer syntaxes that are read.
-pub(super) fn read() -> impl Iterator<Item = &'static str> {
+/// UIDs of the transfer syntaxes that are read.
+pub fn read_syntaxes() -> impl Iterator<Item = &'static str> {
     let whole = [IMPLICIT_LITTLE, EXPLICIT_LITTLE, EXPLICIT_BIG, DEFLATED_UID];
     whole
         .into_iter()
@@ -68,7 +72,7 @@ const COMPRESSED_SYNTAXES: [(&str, Compression); 8] = [
 ];
 
 /// Start and encoding of a data set.
-pub(super) struct Syntax {
+pub struct Syntax {
     /// Offset of the data set's first byte in the unpacked file.
     pub data_set: u64,
     /// The encoding of the data set.
@@ -77,50 +81,75 @@ pub(super) struct Syntax {
     pub deflated: bool,
     /// Compression of the pixels.
     pub compression: Compression,
-    /// Whether the file is gzipped.
-    pub gzip: bool,
     /// Media Storage SOP Class UID (0002,0002).
     pub media_class: Option<String>,
 }
 
 impl Syntax {
-    /// Opens `file` at the start of its data set.
+    /// The place and encoding of the data set of the file `name`, which begins with `start`: its first
+    /// [`START_BYTES`] unpacked bytes, fewer if it is shorter.
     ///
     /// # Errors
-    /// [`VolumeError`] if the file cannot be read.
-    pub(super) fn open(&self, file: &VolumeFile, limit: u64) -> Result<Source, VolumeError> {
-        if self.deflated {
-            return Source::inflate(file, self.data_set, limit);
+    /// [`ReadError::Unsupported`] for transfer syntaxes that are not read, and
+    /// [`ReadError::Field`] if group 0002 is damaged or the encoding cannot be determined.
+    pub fn new(name: &str, start: &[u8]) -> Result<Self, ReadError> {
+        let meta = Meta::new(start).map_err(|begin| ReadError::Field {
+            file: name.into(),
+            field: "File Meta Information (0002,xxxx)",
+            value: "cut off".into(),
+            reason: format!("the group must end within {META_REACH} bytes"),
+            byte: Some(begin as u64),
+        })?;
+        let unknown = || ReadError::Field {
+            file: name.into(),
+            field: "Transfer Syntax UID (0002,0010)",
+            value: "missing".into(),
+            reason: "the encoding cannot be determined from the first element either".into(),
+            byte: Some(meta.end as u64),
+        };
+        let uid = match &meta.transfer_syntax {
+            Some(uid) => uid.as_str(),
+            None => guess(&start[meta.end..]).ok_or_else(unknown)?.uid(),
+        };
+        let transfer_syntax = TransferSyntaxRegistry.get(uid);
+        let deflated = uid == DEFLATED_UID;
+        let listed = COMPRESSED_SYNTAXES.iter().find(|(known, _)| *known == uid);
+        let compression = match (transfer_syntax, listed) {
+            (Some(_), Some((_, compression))) => Some(*compression),
+            (Some(syntax), None) if deflated || syntax.is_codec_free() => Some(Compression::None),
+            _ => None,
+        };
+        let (Some(transfer_syntax), Some(compression)) = (transfer_syntax, compression) else {
+            return Err(refuse(name, transfer_syntax, uid));
+        };
+        let found = Self {
+            data_set: meta.end as u64,
+            transfer_syntax,
+            deflated,
+            compression,
+            media_class: meta.media_class,
+        };
+        // Without group 0002 the first element was asked already.
+        if meta.transfer_syntax.is_some() {
+            found.check(name, &start[meta.end..])?;
         }
-        let mut source = Source::open(file, limit)?;
-        source.skip_to(self.data_set)?;
-        Ok(source)
+        Ok(found)
     }
 
     /// Compares the transfer syntax with the data set, which begins with `stored`.
     ///
     /// # Errors
-    /// [`VolumeError::Field`] if they contradict each other.
-    fn check(
-        &self,
-        file: &VolumeFile,
-        stored: &[u8],
-        limits: &ReadLimits,
-    ) -> Result<(), VolumeError> {
+    /// [`ReadError::Field`] if they contradict each other.
+    fn check(&self, name: &str, stored: &[u8]) -> Result<(), ReadError> {
         let ts = self.transfer_syntax;
-        let wrong = |reason: String| VolumeError::Field {
-            file: file.name().into(),
+        let wrong = |reason: String| ReadError::Field {
+            file: name.into(),
             field: "Transfer Syntax UID (0002,0010)",
             value: format!("{} ({})", ts.uid(), ts.name()),
             reason,
             byte: Some(self.data_set),
         };
-        let deflate = || {
-            let mut start = [0; 8];
-            let mut source = Source::inflate(file, self.data_set, limits.unpacked_bytes).ok()?;
-            let there = source.fill(&mut start).ok()?;
-            encoding(start.get(..there)?)
-        };
+        let deflate = || encoding(&inflated(stored));
         if self.deflated {
             return match (encoding(stored), deflate(), stored) {
                 (_, Some(Encoding::ExplicitLittle), _) => Ok(()),
@@ -155,13 +184,13 @@ impl Syntax {
     }
 
     /// Whether the data set is in Implicit VR.
-    pub(super) fn is_implicit(&self) -> bool {
+    pub fn is_implicit(&self) -> bool {
         self.transfer_syntax.uid() == IMPLICIT_LITTLE
     }
 }
 
 /// Whether a file that begins with `start` is a DICOM file.
-pub(in super::super) fn is_dicom(start: &[u8]) -> bool {
+pub fn is_dicom(start: &[u8]) -> bool {
     start.get(128..132) == Some(b"DICM") || guess(start).is_some()
 }
 
@@ -226,93 +255,29 @@ fn is_zlib(first: u8, second: u8) -> bool {
     first & 0x0f == 8 && first >> 4 <= 7 && u16::from_be_bytes([first, second]).is_multiple_of(31)
 }
 
-/// Finds the data set of `file`.
-///
-/// # Errors
-/// [`VolumeError::Unsupported`] for transfer syntaxes that are not read, and
-/// [`VolumeError::Field`] if group 0002 is damaged or the encoding cannot be determined.
-pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, VolumeError> {
-    let (start, begin, gzip) = beginning(file, limits)?;
-    let meta = Meta::read(&start, begin).ok_or_else(|| VolumeError::Field {
-        file: file.name().into(),
-        field: "File Meta Information (0002,xxxx)",
-        value: "cut off".into(),
-        reason: format!("the group must end within {META_REACH} bytes"),
-        byte: Some(begin as u64),
-    })?;
-    let unknown = || VolumeError::Field {
-        file: file.name().into(),
-        field: "Transfer Syntax UID (0002,0010)",
-        value: "missing".into(),
-        reason: "the encoding cannot be determined from the first element either".into(),
-        byte: Some(meta.end as u64),
-    };
-    let uid = match &meta.transfer_syntax {
-        Some(uid) => uid.as_str(),
-        None => guess(&start[meta.end..]).ok_or_else(unknown)?.uid(),
-    };
-    let transfer_syntax = TransferSyntaxRegistry.get(uid);
-    let deflated = uid == DEFLATED_UID;
-    let listed = COMPRESSED_SYNTAXES.iter().find(|(known, _)| *known == uid);
-    let compression = match (transfer_syntax, listed) {
-        (Some(_), Some((_, compression))) => Some(*compression),
-        (Some(syntax), None) if deflated || syntax.is_codec_free() => Some(Compression::None),
-        _ => None,
-    };
-    match (transfer_syntax, compression) {
-        (Some(transfer_syntax), Some(compression)) => {
-            let found = Syntax {
-                data_set: meta.end as u64,
-                transfer_syntax,
-                deflated,
-                compression,
-                gzip,
-                media_class: meta.media_class,
-            };
-            // Without group 0002 the first element was asked already.
-            if meta.transfer_syntax.is_some() {
-                found.check(file, &start[meta.end..], limits)?;
-            }
-            Ok(found)
-        }
-        _ => Err(refuse(file, transfer_syntax, uid)),
+/// The Media Storage SOP Class UID (0002,0002) of a file that begins with `start`, whatever transfer syntax it is in.
+pub fn media_class(start: &[u8]) -> Option<String> {
+    Meta::new(start).ok()?.media_class
+}
+
+/// The first bytes of the data set that is deflated in `packed`, or in bytes that begin so.
+fn inflated(packed: &[u8]) -> Vec<u8> {
+    let mut start = vec![0; 8];
+    let mut source = DeflateDecoder::new(packed);
+    let mut there = 0;
+    // A stream that ends too early or is damaged gives the bytes before that.
+    while let Ok(got @ 1..) = source.read(&mut start[there..]) {
+        there += got;
     }
-}
-
-/// The first bytes of `file`, where group 0002 begins in them, and whether the file is gzipped.
-fn beginning(
-    file: &VolumeFile,
-    limits: &ReadLimits,
-) -> Result<(Vec<u8>, usize, bool), VolumeError> {
-    let reach = META_REACH.min(usize::try_from(limits.unpacked_bytes).unwrap_or(META_REACH));
-    let mut start = vec![0; reach];
-    let mut source = Source::open(file, limits.unpacked_bytes)?;
-    let there = source.fill(&mut start)?;
     start.truncate(there);
-    let begin = match start.get(128..132) {
-        Some(b"DICM") => 132,
-        _ => 0,
-    };
-    Ok((start, begin, source.is_gzip()))
+    start
 }
 
-/// The Media Storage SOP Class UID (0002,0002) of `file`, whatever transfer syntax it is in.
-///
-/// # Errors
-/// [`VolumeError`] if the file cannot be read.
-pub(super) fn media_class(
-    file: &VolumeFile,
-    limits: &ReadLimits,
-) -> Result<Option<String>, VolumeError> {
-    let (start, begin, _) = beginning(file, limits)?;
-    Ok(Meta::read(&start, begin).and_then(|meta| meta.media_class))
-}
-
-fn refuse(file: &VolumeFile, syntax: Option<&TransferSyntax>, uid: &str) -> VolumeError {
-    let name = syntax.map_or("an unknown transfer syntax", TransferSyntax::name);
-    VolumeError::Unsupported {
-        file: file.name().into(),
-        format: format!("a DICOM file in {name} ({})", clip(uid)),
+fn refuse(name: &str, syntax: Option<&TransferSyntax>, uid: &str) -> ReadError {
+    let syntax = syntax.map_or("an unknown transfer syntax", TransferSyntax::name);
+    ReadError::Unsupported {
+        file: name.into(),
+        format: format!("a DICOM file in {syntax} ({})", clip(uid)),
         fix: "Send it uncompressed, or in RLE, JPEG Lossless, JPEG-LS or JPEG 2000.",
     }
 }
@@ -325,6 +290,19 @@ struct Meta {
 }
 
 impl Meta {
+    /// Reads group 0002 of a file that begins with `start`.
+    ///
+    /// # Errors
+    /// Where the group begins, if its last element is cut off.
+    fn new(start: &[u8]) -> Result<Self, usize> {
+        let begin = match start.get(128..132) {
+            Some(b"DICM") => 132,
+            _ => 0,
+        };
+        let reach = &start[..start.len().min(META_REACH)];
+        Self::read(reach, begin).ok_or(begin)
+    }
+
     /// Reads the elements of group 0002 at `begin`; `None` if the last one is cut off.
     fn read(start: &[u8], begin: usize) -> Option<Self> {
         let mut meta = Self {

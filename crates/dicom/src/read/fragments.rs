@@ -6,7 +6,7 @@ use super::scan::Fragment;
 ///
 /// # Errors
 /// If nothing says where a frame begins.
-pub(super) fn frames_of(
+pub fn frames_of(
     offsets: &[u32],
     fragments: &[Fragment],
     frames: usize,

@@ -6,29 +6,25 @@
 //!
 //! Refused: an item with a table in place of a slope, and ranges of one unit with different slopes.
 
-use super::super::facts::ByteOrder;
 use dicom_core::{Tag, VR};
+use dicom_dictionary_std::tags;
+use dicom_encoding::transfer_syntax::Endianness;
 use std::collections::BTreeMap;
 
 /// Real World Value Mapping Sequence.
-pub(super) const MAPPING_SEQUENCE: Tag = Tag(0x0040, 0x9096);
+pub const MAPPING_SEQUENCE: Tag = tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE;
 /// Measurement Units Code Sequence.
-pub(super) const UNITS_SEQUENCE: Tag = Tag(0x0040, 0x08ea);
+pub const UNITS_SEQUENCE: Tag = tags::MEASUREMENT_UNITS_CODE_SEQUENCE;
 
 /// Name of the sequence for error messages.
-pub(super) const MAPPING_NAME: &str = "Real World Value Mapping Sequence (0040,9096)";
+pub const MAPPING_NAME: &str = "Real World Value Mapping Sequence (0040,9096)";
 
 /// Most items of all frames together.
 const MOST_ITEMS: usize = 1 << 16;
 
-/// Shared Functional Groups Sequence.
-const SHARED_GROUPS: Tag = Tag(0x5200, 0x9229);
-/// Per-frame Functional Groups Sequence.
-const PER_FRAME_GROUPS: Tag = Tag(0x5200, 0x9230);
-
 /// One item.
 #[derive(Debug, Default, Clone, PartialEq)]
-pub(super) struct Mapping {
+pub struct Mapping {
     slope: Option<f64>,
     intercept: Option<f64>,
     /// Number of values in the table.
@@ -40,12 +36,18 @@ pub(super) struct Mapping {
 
 /// The part of an item that an element holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Part {
+pub enum Part {
+    /// The slope.
     Slope,
+    /// The intercept.
     Intercept,
+    /// The values of a table.
     Table,
+    /// The first number that it is for.
     First,
+    /// The last number that it is for.
     Last,
+    /// The code of the unit.
     Unit,
 }
 
@@ -59,23 +61,22 @@ enum Owner {
 
 /// An item of the sequence: its owner and its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Item(Owner, usize);
+pub struct Item(Owner, usize);
 
 impl Item {
     /// The item in which an element `tag` inside the sequences `open` lies, and what it says of it.
-    pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Part)> {
+    pub fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Part)> {
         let (owner, inner) = match open {
-            [(PER_FRAME_GROUPS, frame), inner @ ..] => (Owner::Frame(frame.checked_sub(1)?), inner),
-            [(SHARED_GROUPS, 1), inner @ ..] => (Owner::AllFrames, inner),
+            [
+                (tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, frame),
+                inner @ ..,
+            ] => (Owner::Frame(frame.checked_sub(1)?), inner),
+            [(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, 1), inner @ ..] => (Owner::AllFrames, inner),
             inner => (Owner::File, inner),
         };
-        let (number, part) = match (inner, tag) {
-            ([(MAPPING_SEQUENCE, number)], Tag(0x0040, 0x9225)) => (number, Part::Slope),
-            ([(MAPPING_SEQUENCE, number)], Tag(0x0040, 0x9224)) => (number, Part::Intercept),
-            ([(MAPPING_SEQUENCE, number)], Tag(0x0040, 0x9212)) => (number, Part::Table),
-            ([(MAPPING_SEQUENCE, number)], Tag(0x0040, 0x9216 | 0x9214)) => (number, Part::First),
-            ([(MAPPING_SEQUENCE, number)], Tag(0x0040, 0x9211 | 0x9213)) => (number, Part::Last),
-            ([(MAPPING_SEQUENCE, number), (UNITS_SEQUENCE, 1)], Tag(0x0008, 0x0100)) => {
+        let (number, part) = match inner {
+            [(MAPPING_SEQUENCE, number)] => (number, Part::from_tag(tag)?),
+            [(MAPPING_SEQUENCE, number), (UNITS_SEQUENCE, 1)] if tag == tags::CODE_VALUE => {
                 (number, Part::Unit)
             }
             _ => return None,
@@ -85,24 +86,40 @@ impl Item {
 }
 
 impl Part {
+    /// The part that is the attribute `tag` of the item itself.
+    fn from_tag(tag: Tag) -> Option<Self> {
+        Some(match tag {
+            tags::REAL_WORLD_VALUE_SLOPE => Self::Slope,
+            tags::REAL_WORLD_VALUE_INTERCEPT => Self::Intercept,
+            tags::REAL_WORLD_VALUE_LUT_DATA => Self::Table,
+            tags::REAL_WORLD_VALUE_FIRST_VALUE_MAPPED
+            | tags::DOUBLE_FLOAT_REAL_WORLD_VALUE_FIRST_VALUE_MAPPED => Self::First,
+            tags::REAL_WORLD_VALUE_LAST_VALUE_MAPPED
+            | tags::DOUBLE_FLOAT_REAL_WORLD_VALUE_LAST_VALUE_MAPPED => Self::Last,
+            _ => return None,
+        })
+    }
+
     /// Whether only the length of its value counts.
-    pub(super) fn is_long(self) -> bool {
+    pub fn is_long(self) -> bool {
         self == Self::Table
     }
 }
 
 /// The value of an element of an item.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Stated {
+pub enum Stated {
+    /// A number.
     Number(f64),
     /// Values of a table.
     Count(usize),
+    /// A text.
     Text(String),
 }
 
 impl Stated {
     /// What the bytes of `value` state, of the representation `vr`; `None` if they are no value of it.
-    pub(super) fn new(value: &[u8], vr: VR, order: ByteOrder) -> Option<Self> {
+    pub fn new(value: &[u8], vr: VR, order: Endianness) -> Option<Self> {
         let mut bytes = value.to_vec();
         let word = match vr {
             VR::US | VR::SS => 2,
@@ -113,7 +130,7 @@ impl Stated {
             }
         };
         bytes.truncate(word);
-        if order == ByteOrder::Big {
+        if order == Endianness::Big {
             bytes.reverse();
         }
         Some(Self::Number(match vr {
@@ -126,16 +143,16 @@ impl Stated {
 
 /// All items of a file.
 #[derive(Debug, Default)]
-pub(super) struct Mappings(BTreeMap<Item, Mapping>);
+pub struct Mappings(BTreeMap<Item, Mapping>);
 
 impl Mappings {
     /// Whether one more item can be kept.
-    pub(super) fn has_room(&self) -> bool {
+    pub fn has_room(&self) -> bool {
         self.0.len() < MOST_ITEMS
     }
 
     /// Notes what an element of `item` states.
-    pub(super) fn insert(&mut self, item: Item, part: Part, stated: Stated) {
+    pub fn insert(&mut self, item: Item, part: Part, stated: Stated) {
         let mapping = self.0.entry(item).or_default();
         match (part, stated) {
             (Part::Slope, Stated::Number(slope)) => mapping.slope = Some(slope),
@@ -153,7 +170,7 @@ impl Mappings {
     ///
     /// # Errors
     /// Why the numbers have no single slope.
-    pub(super) fn linear(&self, frame: Option<usize>) -> Result<Option<(f64, f64)>, String> {
+    pub fn linear(&self, frame: Option<usize>) -> Result<Option<(f64, f64)>, String> {
         let owners = [
             frame.map(Owner::Frame),
             Some(Owner::AllFrames),
