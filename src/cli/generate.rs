@@ -91,7 +91,7 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
         None
     };
     for path in &args.report {
-        let text = report_text(path, (&model, whose.as_ref()), &surface, &monitor)?;
+        let text = report_text(path, &model, whose.as_ref(), &surface, &monitor)?;
         write_file(path, text.as_bytes())?;
     }
     if !args.quiet {
@@ -135,7 +135,8 @@ fn check_report_names(reports: &[PathBuf]) -> Result<()> {
 
 fn report_text(
     path: &Path,
-    (model, whose): (&Model, Option<&Provenance>),
+    model: &Model,
+    whose: Option<&Provenance>,
     surface: &MeasuredSurface<'_>,
     monitor: &Monitor,
 ) -> Result<String> {

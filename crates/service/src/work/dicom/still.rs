@@ -84,7 +84,7 @@ pub fn object(
     };
     let cavity = axes.and_then(|(axis, superior)| {
         // A silent monitor is never cancelled.
-        let cavity = cavity(&axis, &superior, &mesh, (&mask, &frame), &Monitor::silent());
+        let cavity = cavity(&axis, &superior, &mesh, &mask, &frame, &Monitor::silent());
         cavity.unwrap_or_default()
     });
     let results = DicomResults::new(&scan, structure(item, &facts), &mask, &mesh, &text)

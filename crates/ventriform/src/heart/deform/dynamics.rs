@@ -146,7 +146,7 @@ pub fn run(
             + sensor_energy(&readings)
             + state.kinetic_energy();
         energies.push(energy);
-        let Some(farthest) = state.step(body, &turns, motion, (&readings, mean.density)) else {
+        let Some(farthest) = state.step(body, &turns, motion, &readings, mean.density) else {
             reason = StopReason::Diverged;
             break;
         };
@@ -305,7 +305,8 @@ impl MotionState {
         body: &Elastic,
         turns: &Turns,
         motion: &Motion,
-        (readings, density): (&[SensorReading], Density),
+        readings: &[SensorReading],
+        density: Density,
     ) -> Option<f64> {
         let dt = motion.time_step;
         let inertia = 1.0 / (dt * dt) + motion.damping / dt;
@@ -366,7 +367,7 @@ mod tests {
         readings: &[SensorReading],
     ) -> Option<f64> {
         let turns = body.turns(&state.mesh.vertices);
-        state.step(body, &turns, motion, (readings, Density::Full))
+        state.step(body, &turns, motion, readings, Density::Full)
     }
 
     /// A body in flight, which nothing deforms, is slowed by the damping alone: implicitly,

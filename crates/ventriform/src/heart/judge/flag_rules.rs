@@ -35,7 +35,8 @@ const MOTION_FLAG_PROBABILITY_OF_UNKNOWN_ORBIT: f64 = 0.5;
 /// ventricle only.
 pub(super) fn flags(
     model: &FittedModel,
-    (evidence, chance): (Option<&Evidence>, f64),
+    evidence: Option<&Evidence>,
+    chance: f64,
     volume: &Volume,
     ventricle: bool,
     orbit: Orbit,
@@ -322,8 +323,8 @@ mod tests {
             let mut fit = found.clone();
             change(&mut fit);
             let (model, judgement) = (&fit.model, &fit.judgement);
-            let judged = (None, judgement.confidence);
-            let flags = flags(model, judged, &volume, false, Orbit::Auto);
+            let chance = judgement.confidence;
+            let flags = flags(model, None, chance, &volume, false, Orbit::Auto);
             let codes: Vec<&str> = flags.iter().map(Flag::code).collect();
             // Nobody searched for the place.
             assert_eq!(codes[0], "uncertain_place");

@@ -95,8 +95,14 @@ pub fn judge(
     };
     let chance = confidence::in_view_of_search(chance, model);
     let ventricle = organ == Organ::LeftVentricle;
-    let judged = (evidence.as_ref(), chance);
-    let flags = flag_rules::flags(model, judged, volume, ventricle, parameters.orbit);
+    let flags = flag_rules::flags(
+        model,
+        evidence.as_ref(),
+        chance,
+        volume,
+        ventricle,
+        parameters.orbit,
+    );
     let confidence = flag_rules::limited(chance, &flags);
     let nodes = match (&model.sensed_wall, &model.localisation) {
         (Some(wall), Some(_)) => {

@@ -41,9 +41,9 @@ pub fn comparison_sheet(sheet: &ComparisonSheet<'_>) -> DrawnPage {
     let scans = sheet
         .scans
         .map(|[stress, rest]| [("stress", stress), ("rest", rest)]);
-    let headline = flags_headline(report.flags.len(), "comparison");
+    let (sign, headline) = flags_headline(report.flags.len(), "comparison");
     let mut blocks = vec![Block::Sentence(Tone::Soft, origin(sheet))];
-    blocks.extend(sheet_parts::verdict(headline, &report.flags));
+    blocks.extend(sheet_parts::verdict(sign, headline, &report.flags));
     blocks.push(pictures_and_figures(sheet));
     blocks.extend(maps(sheet));
     blocks.extend(tables(report));

@@ -143,7 +143,7 @@ impl Direction {
         let even = Summary::from_values(&distances(&even_samples(from, samples), tree, monitor)?);
         let budget = MOST_REFINED * samples;
         let (max_mm, max_at_most_mm) = if from.vertices.len() <= budget {
-            farthest(from, (to, tree), even.max, budget, monitor)?
+            farthest(from, to, tree, even.max, budget, monitor)?
         } else {
             let some = distances(&some_vertices(from, samples), tree, monitor)?;
             (Summary::from_values(&some).max.max(even.max), None)
@@ -164,13 +164,14 @@ impl Direction {
 /// `budget` queries would be needed to bring the two within [`EXCESS_TOLERANCE`].
 fn farthest(
     from: &TriMesh,
-    (to, tree): (&TriMesh, &Bvh),
+    to: &TriMesh,
+    tree: &Bvh,
     found: f64,
     budget: usize,
     monitor: &Monitor,
 ) -> Result<(f64, Option<f64>), Cancelled> {
     let mut points = from.vertices.clone();
-    let mut closest = close_points(&points, (to, tree), found, monitor)?;
+    let mut closest = close_points(&points, to, tree, found, monitor)?;
     let distance = |c: &Closest| c.squared_distance.sqrt();
     let mut best = closest.iter().map(distance).fold(found, f64::max);
     let mut cells = from.triangles.clone();
@@ -193,7 +194,7 @@ fn farthest(
             return Ok((best, None));
         }
         let near = |side: f64| best.min(limit - side * CIRCUMRADIUS_SHARE);
-        let new = close_middles(&sides, &closest, (to, tree), near, monitor)?;
+        let new = close_middles(&sides, &closest, to, tree, near, monitor)?;
         best = new.iter().map(distance).fold(best, f64::max);
         points.extend(sides.iter().map(|side| side.middle));
         closest.extend(new);
@@ -310,7 +311,8 @@ fn in_order<P: Sync>(
 /// instead, which is found much faster.
 fn close_points(
     points: &[Vec3],
-    (to, tree): (&TriMesh, &Bvh),
+    to: &TriMesh,
+    tree: &Bvh,
     near: f64,
     monitor: &Monitor,
 ) -> Result<Vec<Closest>, Cancelled> {
@@ -336,7 +338,8 @@ fn close_points(
 fn close_middles(
     sides: &[Side],
     known: &[Closest],
-    (to, tree): (&TriMesh, &Bvh),
+    to: &TriMesh,
+    tree: &Bvh,
     near: impl Fn(f64) -> f64 + Sync,
     monitor: &Monitor,
 ) -> Result<Vec<Closest>, Cancelled> {

@@ -35,8 +35,8 @@ impl Embedded<'_> {
         (self.mesh.0.triangles.len() <= MOST_TRIANGLES).then(|| {
             json!({
                 "name": self.name,
-                "mesh": mesh_json(self.mesh),
-                "other": self.other.map(mesh_json),
+                "mesh": mesh_json(self.mesh.0, self.mesh.1),
+                "other": self.other.map(|(mesh, uncertainty)| mesh_json(mesh, uncertainty)),
                 "fit": self.fit,
                 "polar": self.polar,
                 "distance": self.closeness.map(by_triangle),
@@ -47,7 +47,7 @@ impl Embedded<'_> {
 }
 
 /// Coordinates and uncertainties in mm, rounded to 0.01.
-fn mesh_json((mesh, uncertainty): (&TriMesh, &[f64])) -> Value {
+fn mesh_json(mesh: &TriMesh, uncertainty: &[f64]) -> Value {
     let rounded = |x: f64| (100.0 * x).round() / 100.0;
     let places = mesh
         .vertices

@@ -33,10 +33,10 @@ pub struct SegmentationSheet<'a> {
 /// The page as a picture. What the report does not contain is left out.
 pub fn segmentation_sheet(sheet: &SegmentationSheet<'_>) -> DrawnPage {
     let report = sheet.report;
-    let headline = flags_headline(report.flags.len(), "segmentation");
+    let (sign, headline) = flags_headline(report.flags.len(), "segmentation");
     let mut blocks = vec![Block::Sentence(Tone::Soft, origin(report))];
     blocks.extend(sheet.scan.and_then(acquisition));
-    blocks.extend(sheet_parts::verdict(headline, &report.flags));
+    blocks.extend(sheet_parts::verdict(sign, headline, &report.flags));
     blocks.extend(slices(sheet));
     blocks.extend(figures(sheet));
     blocks.extend(limits(report));

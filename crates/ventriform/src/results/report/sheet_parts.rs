@@ -42,7 +42,7 @@ impl DrawnPage {
 }
 
 /// The headline of a result, and its flags in words.
-pub(super) fn verdict((sign, headline): (Sign, String), flags: &[RaisedFlag]) -> Vec<Block> {
+pub(super) fn verdict(sign: Sign, headline: String, flags: &[RaisedFlag]) -> Vec<Block> {
     let tone = match sign {
         Sign::Good => Tone::Good,
         Sign::Flag => Tone::Flag,

@@ -36,7 +36,8 @@ pub fn from_files(
     let gated = gates == [HeldGates::Beat; 2];
     let fit = |kept: Option<&str>, which: usize| {
         let monitor = monitor.part(which, scans.len());
-        fitted(order, scans[which], (gated, kept), limits, &monitor)
+        let (scan, files) = scans[which];
+        fitted(order, scan, files, gated, kept, limits, &monitor)
     };
     let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
     checks::refuse_fits(&stress, &rest)?;
@@ -86,8 +87,10 @@ fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<Strin
 /// The heart of a scan, a beat if it is `gated`, by the model `kept` or else that with the greatest confidence.
 fn fitted(
     order: &ComparisonOrder<'_>,
-    (scan, files): (WhichScan, &[VolumeFile]),
-    (gated, kept): (bool, Option<&str>),
+    scan: WhichScan,
+    files: &[VolumeFile],
+    gated: bool,
+    kept: Option<&str>,
     limits: &ReadLimits,
     monitor: &Monitor<'_>,
 ) -> Result<ComparedHeart, ComparisonError> {

@@ -89,7 +89,7 @@ impl HeartFrame {
     }
 
     /// Middle of a slice, and the directions right and down on the picture.
-    fn slice(&self, kind: Kind, number: usize) -> (Vec3, Vec3, Vec3) {
+    fn slice(&self, kind: Kind, number: usize) -> [Vec3; 3] {
         let middle = (self.apex + self.base) / 2.0;
         let across = |direction: Vec3| {
             let share = 2.0 * number as f64 / (SLICES_PER_ROW - 1) as f64 - 1.0;
@@ -101,10 +101,10 @@ impl HeartFrame {
                 let share = number as f64 / (SLICES_PER_ROW - 1) as f64;
                 let along = first + (last - first) * share;
                 let place = self.apex + (self.base - self.apex) * along;
-                (place, self.lateral, -self.anterior)
+                [place, self.lateral, -self.anterior]
             }
-            Kind::Vertical => (across(self.lateral), self.axis(), -self.anterior),
-            Kind::Horizontal => (across(self.anterior), self.lateral, -self.axis()),
+            Kind::Vertical => [across(self.lateral), self.axis(), -self.anterior],
+            Kind::Horizontal => [across(self.anterior), self.lateral, -self.axis()],
         }
     }
 }
@@ -160,7 +160,7 @@ pub(super) fn png(
                 monitor.check()?;
                 let slice = frame.slice(kind, number);
                 let left = LABEL_WIDTH_PX + number * CELL_PX;
-                paint(&mut picture, (left, top), slice, &field, map.reference);
+                paint(&mut picture, [left, top], slice, &field, map.reference);
             }
             label(&mut picture, top, kind, scan);
         }
@@ -170,8 +170,8 @@ pub(super) fn png(
 
 fn paint(
     picture: &mut Image<3>,
-    (left, top): (usize, usize),
-    (middle, right, down): (Vec3, Vec3, Vec3),
+    [left, top]: [usize; 2],
+    [middle, right, down]: [Vec3; 3],
     field: &Field,
     reference: f64,
 ) {

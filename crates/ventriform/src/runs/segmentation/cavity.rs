@@ -18,7 +18,8 @@ pub fn cavity(
     axis: &LongAxis,
     superior: &Vec3,
     mesh: &TriMesh,
-    (wall, frame): (&Mask, &VoxelToPatient),
+    wall: &Mask,
+    frame: &VoxelToPatient,
     monitor: &Monitor<'_>,
 ) -> Result<Option<Mask>, Cancelled> {
     let [base, apex] = axis.ends();

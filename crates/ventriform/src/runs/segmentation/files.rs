@@ -270,14 +270,14 @@ impl SegmentedVolume {
         let structure = Structure::from_organ(self.parameters.organ.as_str());
         let report = self.report();
         let polar = made.polar.as_ref().map(polar::png);
-        let placed = (&made.mask, &self.reading.volume.frame);
         let cavity = report.axes().and_then(|(axis, superior)| {
             // A silent monitor is never cancelled.
             let cavity = cavity(
                 &axis,
                 &superior,
                 &made.fit.model.mesh,
-                placed,
+                &made.mask,
+                &self.reading.volume.frame,
                 &Monitor::silent(),
             );
             cavity.unwrap_or_default()
@@ -326,9 +326,7 @@ impl SegmentedVolume {
     ) -> Result<[NamedFile; 2], SegmentationFilesError> {
         let mesh = &self.segmentation.fit.model.mesh;
         let cavity = match self.report().axes() {
-            Some((axis, superior)) => {
-                cavity(&axis, &superior, mesh, (wall, &place.frame), monitor)?
-            }
+            Some((axis, superior)) => cavity(&axis, &superior, mesh, wall, &place.frame, monitor)?,
             None => None,
         };
         let mut labels: Vec<u8> = wall.voxels.iter().map(|inside| u8::from(*inside)).collect();

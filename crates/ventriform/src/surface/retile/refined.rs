@@ -309,8 +309,13 @@ impl<'a> RefinedRun<'a> {
         for &v in &random {
             missing[self.components[v as usize] as usize] += 1;
         }
-        let places = (self.components.as_slice(), self.spacing.as_slice());
-        let mut seeds = split::seeds(cells, &self.samples, places, &missing);
+        let mut seeds = split::seeds(
+            cells,
+            &self.samples,
+            &self.components,
+            &self.spacing,
+            &missing,
+        );
         let mut taken = vec![false; self.samples.len()];
         for &v in &seeds {
             taken[v as usize] = true;

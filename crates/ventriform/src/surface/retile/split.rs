@@ -20,7 +20,8 @@ struct Neighbours {
 pub(super) fn seeds(
     cells: &Cells,
     samples: &WeightedSamples,
-    (components, spacing): (&[u32], &[f64]),
+    components: &[u32],
+    spacing: &[f64],
     wanted: &[usize],
 ) -> Vec<u32> {
     let mut taken = vec![false; samples.len()];
@@ -115,7 +116,7 @@ mod tests {
         let sites: Vec<u32> = (0..12).collect();
         let cells = Cells::grow(&samples, &sites);
         let (components, spacing) = (vec![0; samples.len()], vec![1.0; samples.len()]);
-        let all = seeds(&cells, &samples, (&components, &spacing), &[1000]);
+        let all = seeds(&cells, &samples, &components, &spacing, &[1000]);
         assert_eq!(all[..12], sites);
         assert_eq!(all.len(), 42);
         assert_eq!(all.iter().collect::<BTreeSet<_>>().len(), 42);
@@ -133,7 +134,7 @@ mod tests {
                 "{off}"
             );
         }
-        let some = seeds(&cells, &samples, (&components, &spacing), &[30]);
+        let some = seeds(&cells, &samples, &components, &spacing, &[30]);
         assert_eq!(some.len(), 30);
         assert!(some.iter().all(|v| all.contains(v)));
     }
@@ -148,7 +149,7 @@ mod tests {
         let components = vec![0; samples.len()];
         let fine_above = |p: &Vec3| if p.z > 0.0 { 0.5 } else { 1.0 };
         let spacing: Vec<f64> = samples.working.iter().map(fine_above).collect();
-        let some = seeds(&cells, &samples, (&components, &spacing), &[20]);
+        let some = seeds(&cells, &samples, &components, &spacing, &[20]);
         let above = |v: &u32| samples.working[*v as usize].z > 0.0;
         assert!(some.len() == 20 && some[12..].iter().all(above));
     }
