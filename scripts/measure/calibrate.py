@@ -11,7 +11,7 @@
 The table (scripts/measure/calibration/features.csv, --table for another one) has one row for each scan. It is made by
 
     make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
-    cargo run --release -p ventriform-tools --bin calibration_features -- COHORT CASES/SET... > features.csv
+    cargo run --release -p ventriform-evaluation --bin calibration_features -- COHORT CASES/SET... > features.csv
 
 Each model is a logistic regression by maximum likelihood, with a ridge of 1 on the standardised terms and none on the
 intercept. Terms of the first four models are standardised by mean and standard deviation over the scans that the

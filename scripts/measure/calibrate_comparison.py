@@ -10,7 +10,7 @@ A table is what the tool `comparisons` prints; the committed one has the 20 pair
 of the simulator of pairs (no part of this project):
 
     make_pairs.py --out PAIRS --seed 610 --n 20 --gates 0
-    cargo run --release -p ventriform-tools --bin comparisons -- PAIRS/* > TABLE
+    cargo run --release -p ventriform-evaluation --bin comparisons -- PAIRS/* > TABLE
 
 - Deviation of the difference: root mean square over the pairs without reversible wall.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies

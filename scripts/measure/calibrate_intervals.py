@@ -12,9 +12,9 @@ crates/ventriform/src/heart/judge/volume_calibration.rs, the first 118 scans of 
 (neither is part of this project):
 
     gated.py --out CASES --seed 500 --n 20
-    cargo run --release -p ventriform-tools --bin beats -- CASES/* > TABLE
+    cargo run --release -p ventriform-evaluation --bin beats -- CASES/* > TABLE
     make_cases.py --out CASES --seed 5001 --n 118
-    cargo run --release -p ventriform-tools --bin volumes -- CASES > TABLE
+    cargo run --release -p ventriform-evaluation --bin volumes -- CASES > TABLE
 
 An error is found minus true (EF, points) or found over true minus 1 (volumes). Its variance is usual^2 + (dark share)^2
 + (small 60 ml / cavity)^2, by maximum likelihood of a normal distribution.

@@ -1,7 +1,7 @@
 //! Writes the tables of features from which `scripts/measure/calibrate_walls.py` estimates the constants of
 //! `crates/ventriform/src/heart/deform/calibration.rs` and `crates/ventriform/src/heart/judge/uncertainty_calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of
+//! `cargo run --release -p ventriform-evaluation --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of
 //! every case in the folders with the built-in hearts, once for each wall, and compares rims and anatomical walls
 //! with `lv_surface.ply`, apparent walls with `lv_expert_img.nii.gz`. Refused scans and those without a heart are
 //! left out. Into the folder TABLES it writes
@@ -31,8 +31,8 @@ use ventriform::parameters::FitParameters;
 use ventriform::results::report::MeasuredSurface;
 use ventriform::runs::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
-use ventriform_tools::walls::{Result, true_shifts, true_wall};
-use ventriform_tools::{cases, name_of};
+use ventriform_evaluation::walls::{Result, true_shifts, true_wall};
+use ventriform_evaluation::{cases, name_of};
 
 /// Rays from one row of the table to the next. It has no factor in common with the rays of a row.
 const RAY_STRIDE: usize = 157;

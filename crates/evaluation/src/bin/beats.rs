@@ -1,7 +1,7 @@
 //! Figures of beats beside the truth of simulated gated studies.
 //!
 //! ```sh
-//! cargo run --release --package ventriform-tools --bin beats -- [PRIOR=VALUE]... FOLDER...
+//! cargo run --release --package ventriform-evaluation --bin beats -- [PRIOR=VALUE]... FOLDER...
 //! ```
 //!
 //! Every folder holds gated.nii.gz and params.json, as the simulator of gated hearts writes them: "result" with
@@ -18,7 +18,7 @@ use ventriform::heart::beat::{self, Beat, BeatParameters, GatedStudy, Priors};
 use ventriform::image::volume::{ReadLimits, VolumeFile, read_gates};
 use ventriform::parameters::FitParameters;
 use ventriform::runs::segmentation::{SegmentationParameters, built_in, segment};
-use ventriform_tools::statistics;
+use ventriform_evaluation::statistics;
 
 /// Contraction of a segment, as a share of a whole one's, below which it counts as akinetic.
 const AKINETIC_CONTRACTION: f64 = 0.25;

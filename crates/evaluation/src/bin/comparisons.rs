@@ -1,7 +1,7 @@
 //! Comparisons of rest and stress beside the truth of simulated pairs.
 //!
 //! ```sh
-//! cargo run --release --package ventriform-tools --bin comparisons -- PAIR...
+//! cargo run --release --package ventriform-evaluation --bin comparisons -- PAIR...
 //! ```
 //!
 //! Every PAIR is a folder with stress/spect.nii.gz, rest/spect.nii.gz and pair.json, as the simulator of pairs writes

@@ -1,7 +1,7 @@
 //! Writes the table of features from which `scripts/measure/calibrate.py` estimates the constants of
 //! `crates/ventriform/src/heart/judge/calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin calibration_features -- FOLDER... > features.csv` segments
+//! `cargo run --release -p ventriform-evaluation --bin calibration_features -- FOLDER... > features.csv` segments
 //! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall, and compares the
 //! apparent wall with `lv_expert_img.nii.gz`, the anatomical one with `lv_truth.nii.gz`. One row for each case: the
 //! folder's name, the case's, whether there is a heart and how far it moved (mm, by `params.json`), the Jaccard index
@@ -26,7 +26,7 @@ use ventriform::parameters::FitParameters;
 use ventriform::runs::segmentation::{
     Segmentation, SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
 };
-use ventriform_tools::{cases, name_of};
+use ventriform_evaluation::{cases, name_of};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 

@@ -2,7 +2,7 @@
 //! axes exchanged.
 //!
 //! ```sh
-//! cargo run --release --package ventriform-tools --bin exchanged_axes -- SEED FOLDER...
+//! cargo run --release --package ventriform-evaluation --bin exchanged_axes -- SEED FOLDER...
 //! ```
 //!
 //! Every FOLDER holds spect.nii.gz and lv_truth.nii.gz. Prints a row for each scan: as it is, with sides and length

@@ -1,5 +1,5 @@
 //! Prints the built-in hearts, made anew from phantoms:
-//! `cargo run --release -p ventriform-tools --bin built_in > crates/ventriform/src/runs/segmentation/built_in/hearts.json`
+//! `cargo run --release -p ventriform-evaluation --bin built_in > crates/ventriform/src/runs/segmentation/built_in/hearts.json`
 
 use ventriform::base::progress::{Cancelled, Monitor};
 use ventriform::runs::segmentation::built_in::hearts_json;

@@ -1,6 +1,6 @@
 //! Prints the figures that the confidence of a fit is calibrated on.
 //!
-//! `cargo run --release -p ventriform-tools --bin confidence -- FOLDER...` segments
+//! `cargo run --release -p ventriform-evaluation --bin confidence -- FOLDER...` segments
 //! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall. Each
 //! case gives one line: its name, the Jaccard index of the apparent wall with `lv_expert_img.nii.gz` and
 //! of the anatomical wall with `lv_truth.nii.gz` (`-` without a fit), then, as JSON, for each wall the

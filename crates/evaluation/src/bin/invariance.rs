@@ -1,6 +1,6 @@
 //! Measures how much volumes and segment means vary when a scan is rotated, shifted or noisier.
 //!
-//! `cargo run --release -p ventriform-tools --bin invariance -- MODEL COHORT [superior=frame]` makes a model of 150
+//! `cargo run --release -p ventriform-evaluation --bin invariance -- MODEL COHORT [superior=frame]` makes a model of 150
 //! points from the scan MODEL and fits it to every case of COHORT and to changed copies of it. For
 //! each kind of change it prints coefficients of variation over the copies: of the volumes of wall and
 //! cavity (largest over the cases), and of the worst of the 17 segment means (mean and maximum over

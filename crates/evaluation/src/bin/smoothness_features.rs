@@ -1,7 +1,7 @@
 //! Writes the table of features from which `scripts/measure/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
 //! `crates/ventriform/src/heart/deform/calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz`
+//! `cargo run --release -p ventriform-evaluation --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz`
 //! of every case in the folders, as it is and blurred by further Gaussian filters, and compares the apparent walls with
 //! `lv_surface.ply`. Refused scans and those without a heart are left out. TABLE has a row for each fit: the filter
 //! that was added (full width at half maximum, mm), the smoothness of the image, mm, the cavity's size, ml, and the
@@ -19,8 +19,8 @@ use ventriform::image::grid::field::Field;
 use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform::parameters::FitParameters;
 use ventriform::{Scan, TriMesh};
-use ventriform_tools::walls::{Result, true_shifts, true_wall};
-use ventriform_tools::{cases, name_of};
+use ventriform_evaluation::walls::{Result, true_shifts, true_wall};
+use ventriform_evaluation::{cases, name_of};
 
 /// Full widths at half maximum of the filters that are added, mm.
 const ADDED_MM: [f64; 3] = [0.0, 7.0, 11.3];

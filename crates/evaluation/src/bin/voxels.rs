@@ -1,6 +1,6 @@
 //! The voxels that are read of files, for `scripts/check/dicom_codecs.py`.
 //!
-//!     cargo run -p ventriform-tools --bin voxels -- FILE...
+//!     cargo run -p ventriform-evaluation --bin voxels -- FILE...
 //!
 //! Reads each FILE as a volume by itself. Beside it, FILE.f32 holds its voxels as little endian `f32`, and
 //! FILE.error the message if it is refused.

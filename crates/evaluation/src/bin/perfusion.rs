@@ -1,7 +1,7 @@
 //! Figures against normal limits beside the truth of simulated scans.
 //!
 //! ```sh
-//! cargo run --release --package ventriform-tools --bin perfusion -- NORMALS FOLDER...
+//! cargo run --release --package ventriform-evaluation --bin perfusion -- NORMALS FOLDER...
 //! ```
 //!
 //! NORMALS is a file that `ventriform normals build` wrote. Every folder holds cohort.csv and, of every case, the
@@ -22,7 +22,7 @@ use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::FitParameters;
 use ventriform::runs::evaluate::normals::table::{self, CohortRow};
 use ventriform::runs::segmentation::{SegmentationOrder, from_files};
-use ventriform_tools::statistics::{area_under_curve, correlation, mean};
+use ventriform_evaluation::statistics::{area_under_curve, correlation, mean};
 
 /// Share below normal at which a true score begins, as the simulator has it.
 const TRUE_LIMIT: f64 = 0.15;

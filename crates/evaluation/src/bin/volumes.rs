@@ -1,7 +1,7 @@
 //! Writes the table of volumes from which `scripts/measure/calibrate_intervals.py` estimates the constants of
 //! `crates/ventriform/src/heart/judge/volume_calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every
+//! `cargo run --release -p ventriform-evaluation --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every
 //! case in the folders. TABLE has a row for each heart that is not refused: the folder's name, the case's, the volumes
 //! of the anatomical wall and of its cavity, found and true (`params.json`, "result"), ml, the share of the wall that
 //! is dark, the resolution, mm, and the confidence.
@@ -11,8 +11,8 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde_json::Value;
 use ventriform::parameters::FitParameters;
-use ventriform_tools::walls::Result;
-use ventriform_tools::{cases, name_of};
+use ventriform_evaluation::walls::Result;
+use ventriform_evaluation::{cases, name_of};
 
 fn main() -> Result<()> {
     let folders = std::env::args().skip(1).map(Into::into);
