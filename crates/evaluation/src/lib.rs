@@ -1,5 +1,6 @@
 //! The parts that all instruments share.
 
+pub mod simulator;
 pub mod statistics;
 pub mod walls;
 
