@@ -152,6 +152,7 @@ pub fn patient(case: &str, seed: u64, made: &str, profile: &Profile) -> Paramete
     Parameters {
         case: case.into(),
         seed,
+        noise_seed: seed,
         made: made.into(),
         spacing_mm: profile.spacing_mm,
         sex: if female { 'F' } else { 'M' },

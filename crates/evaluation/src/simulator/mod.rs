@@ -29,14 +29,20 @@ pub mod curve;
 pub mod cut;
 pub mod draw;
 pub mod files;
+pub mod gated;
 pub mod grid;
+pub mod healthy;
 pub mod kinds;
+pub mod pairs;
 pub mod parameters;
 pub mod random;
 pub mod reader;
 pub mod reconstruct;
 pub mod scan;
+pub mod study;
 pub mod truth;
+pub mod variants;
+pub mod walls;
 
 #[cfg(test)]
 mod tests;

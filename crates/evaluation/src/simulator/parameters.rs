@@ -8,8 +8,10 @@ use serde_json::Value;
 pub struct Parameters {
     /// The name of the case's folder.
     pub case: String,
-    /// The seed of its streams.
+    /// The seed of its anatomy.
     pub seed: u64,
+    /// The seed of its counts.
+    pub noise_seed: u64,
     /// Its kind.
     pub made: String,
     /// Edge of a voxel, and of a detector's bin.

@@ -130,7 +130,7 @@ impl<'a> Scene<'a> {
     /// The counts of a gate, which has a share of the acquisition's.
     pub fn counts(&self, gate: usize, share: f64) -> Counts {
         let exposure = Exposure {
-            seed: self.parameters.seed,
+            seed: self.parameters.noise_seed,
             gate,
             share,
             side_window: self.parameters.reconstruction.scatter_corrected,

@@ -1,6 +1,6 @@
 //! The heart as images: how much of each voxel is wall or cavity, and its uptake, as means over phases.
 
-use super::material::MU_STEP;
+use super::material::{MU_STEP, SPOKES};
 use super::ventricle::{Phase, Ventricle};
 use super::{Directions, Place, Vec3, breathing};
 use crate::simulator::grid::{Beyond, Grid};
@@ -103,14 +103,16 @@ impl PlacedHeart {
         let factor = (place.step_mm / LARGEST_STEP_MM).ceil() as usize;
         let fine = place.finer(factor);
         let phases: Vec<Moment> = (self.ventricle.phases[phases].iter())
-            .map(|phase| Moment::new(phase, self.ventricle.heart.twist_deg.to_radians()))
+            .map(|phase| Moment::new(phase, &self.ventricle))
             .collect();
+        let reach = Reach::new(self, &phases, fine.step_mm);
         let planes = Grid::from_samples(fine.shape, |at| {
-            self.sample(
-                &self.directions.parts(&(fine.at(at) - self.origin)),
-                &phases,
-                fine.step_mm,
-            )
+            let point = self.directions.parts(&(fine.at(at) - self.origin));
+            if reach.holds(&point) {
+                self.sample(&point, &phases, fine.step_mm)
+            } else {
+                [0.0; 4]
+            }
         });
         let kernel = breathing::kernel(self.breath_mm, place.step_mm);
         let [wall, cavity, uptake, right] = planes.map(|grid| {
@@ -209,6 +211,44 @@ impl Ventricle {
     }
 }
 
+/// Where a heart is, generously: a cylinder about the left ventricle, and the right one in its widest phase.
+struct Reach<'a> {
+    right: &'a RightVentricle,
+    radius_mm: f64,
+    low_mm: f64,
+    high_mm: f64,
+    step_mm: f64,
+}
+
+impl<'a> Reach<'a> {
+    fn new(heart: &'a PlacedHeart, moments: &[Moment], step_mm: f64) -> Self {
+        let base = heart.ventricle.base.iter().copied().fold(0.0, f64::max) + MU_STEP;
+        let bend = heart.ventricle.heart.bend;
+        let largest = |of: &dyn Fn(&Moment) -> f64| moments.iter().map(of).fold(f64::MIN, f64::max);
+        let focal = |moment: &Moment| moment.phase.focal_mm;
+        Self {
+            right: &heart.right,
+            radius_mm: largest(&|m| focal(m) * (m.far * m.far - 1.0).sqrt())
+                + 2.0 * bend[0].hypot(bend[1])
+                + 2.0 * step_mm,
+            low_mm: -largest(&|m| -focal(m) * m.far * base.cos() - m.phase.shift_mm)
+                - 2.0 * step_mm,
+            high_mm: largest(&|m| focal(m) * m.far + m.phase.shift_mm) + 2.0 * step_mm,
+            step_mm,
+        }
+    }
+
+    fn holds(&self, at: &[f64; 3]) -> bool {
+        let of_left =
+            at[0].hypot(at[1]) < self.radius_mm && (self.low_mm..self.high_mm).contains(&at[2]);
+        let radius2 = (0..3).map(|i| {
+            let half = self.right.half_axes[i] + 3.0 * self.step_mm;
+            ((at[i] - self.right.centre[i]) / half).powi(2)
+        });
+        of_left || radius2.sum::<f64>() < 1.0
+    }
+}
+
 /// A phase, with what sampling needs.
 struct Moment<'a> {
     phase: &'a Phase,
@@ -227,13 +267,16 @@ struct Near {
 }
 
 impl<'a> Moment<'a> {
-    fn new(phase: &'a Phase, twist: f64) -> Self {
+    fn new(phase: &'a Phase, ventricle: &Ventricle) -> Self {
         // Beyond the base no ring is part of the wall; one ring more for what lies between.
-        let largest = phase.outer.0.iter().copied().fold(0.0, f64::max);
-        let margin = largest + 2.0 * MU_STEP;
+        let end = ventricle.base.iter().copied().fold(0.0, f64::max) + 2.0 * MU_STEP;
+        let rings = (end / MU_STEP) as usize;
+        let wall = phase.outer.0.iter().take(rings * SPOKES);
+        let margin = wall.copied().fold(0.0, f64::max) + 2.0 * MU_STEP;
+        let twist = ventricle.heart.twist_deg.to_radians() * phase.way;
         Self {
             phase,
-            twist: twist * phase.way,
+            twist,
             far: margin.cosh(),
         }
     }
