@@ -193,7 +193,7 @@ fn dilate(heart: &mut Heart, factor: f64) {
             defects: Vec::new(),
             ..heart.clone()
         };
-        Ventricle::new(&plain, 1).muscle_ml()
+        Ventricle::at_end_diastole(&plain).muscle_ml()
     };
     let wanted = muscle(heart);
     heart.edv_ml *= factor;
@@ -216,7 +216,7 @@ fn pair_truth(
     [of_stress, of_rest]: [&Value; 2],
     moved: &Value,
 ) -> Value {
-    let [at_stress, at_rest] = [stress, rest].map(|scan| Ventricle::new(&scan.heart, 1));
+    let [at_stress, at_rest] = [stress, rest].map(|scan| Ventricle::at_end_diastole(&scan.heart));
     let areas = at_rest.areas();
     let lost = Map::from_index(|at| 1.0 - at_stress.uptake.0[at] / at_rest.uptake.0[at].max(1e-6));
     let share = |level: f64| {

@@ -5,6 +5,7 @@
 
 use super::draw::{Profile, patient};
 use super::parameters::{BodyMotion, Defect, Filter, Method, Parameters};
+use std::f64::consts::PI;
 
 /// The two hearts: name, seed, end-diastolic volume (ml), ejection fraction, female.
 pub const HEARTS: [(&str, u64, f64, f64, bool); 2] = [
@@ -184,7 +185,7 @@ fn change_heart(variant: &str, p: &mut Parameters) {
         "ash" => (heart.h0, heart.sept_thin, heart.lat_thick) = (11.0, -0.75, -0.05),
         "aneurysm" => {
             heart.defects = vec![scar(&[7, 8, 13, 14, 15, 16, 17], 0.92, 1.0, 0.45)];
-            heart.modes_mu = vec![[9.0, 3.14], [3.0, 3.14]];
+            heart.modes_mu = vec![[9.0, PI], [3.0, PI]];
         }
         "tl201" => (heart.blood, heart.rv_uptake) = (0.22, 0.6),
         "lowcontrast" => heart.blood = 0.38,

@@ -232,7 +232,7 @@ impl<'a> Shapes<'a> {
                 + (y.abs() / (body.half_depth_mm * scale)).powf(body.exponent)
         };
         let in_trunk = radius(1.0) < 1.0;
-        if !in_trunk && !(body.female && y > 0.0) {
+        if !in_trunk && (!body.female || y <= 0.0) {
             return None;
         }
         let [w, d] = [body.half_width_mm, body.half_depth_mm];

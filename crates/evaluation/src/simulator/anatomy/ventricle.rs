@@ -88,6 +88,13 @@ pub struct AxisPoints {
 impl Ventricle {
     /// The ventricle in `phases` phases of its cycle.
     pub fn new(heart: &Heart, phases: usize) -> Self {
+        let mut made = Self::at_end_diastole(heart);
+        made.phases = made.cycle(phases);
+        made
+    }
+
+    /// The ventricle at end diastole, without any phase.
+    pub fn at_end_diastole(heart: &Heart) -> Self {
         let base = base_of(heart);
         let relief = relief_of(heart);
         let wanted = thickness_of(heart, &base);
@@ -133,7 +140,7 @@ impl Ventricle {
                 *own += region.degrees * mask;
             }
         }
-        let mut made = Self {
+        Self {
             heart: heart.clone(),
             base,
             focal_mm,
@@ -146,9 +153,7 @@ impl Ventricle {
             contraction,
             delay,
             phases: Vec::new(),
-        };
-        made.phases = made.cycle(phases);
-        made
+        }
     }
 
     /// Volume of the muscle at end diastole, ml.
