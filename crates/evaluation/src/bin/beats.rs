@@ -6,11 +6,11 @@
 //!
 //! Every folder holds gated.nii.gz and params.json, as the simulator of gated hearts writes them: "result" with
 //! edv_ml, esv_ml, ef, and segments with motion_mm, thickening_percent and contraction (below .25: akinetic). Prints
-//! a row for each study, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and
+//! a row for each study that has a fit, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and
 //! deviation of motion and thickening (also by counts) over all segments, and how well thickening finds the akinetic
 //! ones. PRIOR names a field of [`Priors`], or `resolution_more_mm`.
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use serde_json::Value;
 use std::path::Path;
 use ventriform::base::progress::Monitor;
@@ -40,8 +40,10 @@ fn main() -> Result<()> {
     let mut table = Table::default();
     for study in &studies {
         let folder = Path::new(study);
-        let row = one(folder, &parameters, resolution_more_mm);
-        table.add(folder, &row.with_context(|| study.clone())?);
+        match one(folder, &parameters, resolution_more_mm) {
+            Ok(row) => table.add(folder, &row),
+            Err(error) => eprintln!("{study} is left out: {error:#}"),
+        }
     }
     table.print();
     Ok(())

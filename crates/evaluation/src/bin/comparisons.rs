@@ -9,7 +9,7 @@
 //! the anatomical wall and of the wall as it looks, that of the muscle, the deviation of the difference over the wall,
 //! the reversible share, the territory that has most of it, and flags.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use serde_json::Value;
 use std::path::Path;
 use ventriform::base::progress::Monitor;
@@ -23,8 +23,10 @@ fn main() -> Result<()> {
          sd_points,reversible,true_reversible,territory,true_territory,fixed,flags"
     );
     for folder in std::env::args().skip(1) {
-        let row = row(Path::new(&folder)).with_context(|| folder.clone())?;
-        println!("{row}");
+        match row(Path::new(&folder)) {
+            Ok(row) => println!("{row}"),
+            Err(error) => eprintln!("{folder} is left out: {error:#}"),
+        }
     }
     Ok(())
 }

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! NORMALS is a file that `ventriform normals build` wrote. Every folder holds cohort.csv and, of every case, the
-//! scan and params.json, as the simulator's make_healthy.py writes them: "result"."perfusion" with deficit_percent
+//! scan and params.json, as `simulate healthy` writes them: "result"."perfusion" with deficit_percent
 //! and segment_deficit, a share for each segment. Prints a row for each case, then over all: area under the ROC curve
 //! of the deficit score and of the area below 60 % of the scan's own maximum (defect or none), their correlation with
 //! the true deficit, the wall beyond the limit in healthy hearts, how many single basal defects lie above every

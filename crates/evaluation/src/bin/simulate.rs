@@ -12,7 +12,7 @@ use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use ventriform_evaluation::simulator::gated::{self, GatedOrder};
-use ventriform_evaluation::simulator::healthy::{self, Protocol};
+use ventriform_evaluation::simulator::healthy::{self, OneDefect, Protocol};
 use ventriform_evaluation::simulator::kinds::{self, Kind, Sampling};
 use ventriform_evaluation::simulator::random::{Draws, Stream};
 use ventriform_evaluation::simulator::study::StudyOptions;
@@ -36,7 +36,8 @@ enum What {
     Cases {
         #[command(flatten)]
         order: Order,
-        /// Kinds, taken in turn. Beyond these: hotgut, filter, drift, cut, camera, few
+        /// Kinds, taken in turn. Beyond these: hotgut, filter, drift, cut, camera, few,
+        /// healthy, halfapex, oneapex, apexplus
         #[arg(long, value_delimiter = ',', default_values_t = usual_kinds())]
         kinds: Vec<String>,
         /// 64 voxels of 6.0 to 6.8 mm along an axis instead of 128 of 3.3 to 4.8
@@ -59,6 +60,9 @@ enum What {
         /// One defect in each heart
         #[arg(long)]
         one_defect: bool,
+        /// One dark segment at the base of each heart
+        #[arg(long, conflicts_with = "one_defect")]
+        basal: bool,
     },
     /// One heart at stress and at rest
     Pairs {
@@ -191,17 +195,22 @@ fn main() -> Result<()> {
             gates,
             matrix,
             one_defect,
+            basal,
         } => {
             let protocol = Protocol::from_name(&protocol)
                 .with_context(|| format!("{protocol} is no protocol"))?;
-            let letter = if one_defect { 'd' } else { 'n' };
+            let (letter, defect) = match (one_defect, basal) {
+                (true, _) => ('d', Some(OneDefect::OfTerritory)),
+                (_, true) => ('b', Some(OneDefect::Basal)),
+                _ => ('n', None),
+            };
             let options = options(gates, HEALTHY_HEIGHT_MM);
             order.make(
                 |number| format!("{letter}{}_{number:03}", order.seed),
                 &|one: &Case| {
                     let female = one.number % 2 == 1;
                     let parameters =
-                        healthy::draw(one.name, one.seed, female, &protocol, matrix, one_defect);
+                        healthy::draw(one.name, one.seed, female, &protocol, matrix, defect);
                     study::write(&parameters, &options, one.folder).map(drop)
                 },
             )?;

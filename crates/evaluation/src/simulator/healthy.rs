@@ -128,6 +128,34 @@ pub fn person(
     p
 }
 
+/// The one defect of a heart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OneDefect {
+    /// Of a territory.
+    OfTerritory,
+    /// One dark segment at the base.
+    Basal,
+}
+
+impl OneDefect {
+    fn draw(self, d: &mut Draws) -> Defect {
+        let (territory, segments, severity) = match self {
+            OneDefect::OfTerritory => {
+                let territory = d.pick(&TERRITORIES);
+                let segments = d.pick(territory.defects).to_vec();
+                (Some(territory.name), segments, d.uniform(0.25, 0.9))
+            }
+            OneDefect::Basal => (None, vec![1 + d.index(6)], d.uniform(0.4, 0.95)),
+        };
+        Defect {
+            territory,
+            shift_theta: d.normal(0.0, 8.0),
+            shift_mu: d.normal(0.0, 3.0),
+            ..Defect::of_uptake(&segments, severity)
+        }
+    }
+}
+
 /// The parameters of a case, with one defect if it is asked for.
 pub fn draw(
     case: &str,
@@ -135,21 +163,14 @@ pub fn draw(
     female: bool,
     protocol: &Protocol,
     matrix: usize,
-    one_defect: bool,
+    defect: Option<OneDefect>,
 ) -> Parameters {
     let mut draws = Draws::new(seed, Stream::Kind);
     let d = &mut draws;
     let mut p = person(case, seed, "healthy", female, matrix, d);
     protocol.apply(&mut p, d);
-    if one_defect {
-        let territory = d.pick(&TERRITORIES);
-        let segments = d.pick(territory.defects);
-        p.heart.defects = vec![Defect {
-            territory: Some(territory.name),
-            shift_theta: d.normal(0.0, 8.0),
-            shift_mu: d.normal(0.0, 3.0),
-            ..Defect::of_uptake(segments, d.uniform(0.25, 0.9))
-        }];
+    if let Some(defect) = defect {
+        p.heart.defects = vec![defect.draw(d)];
         p.made = "one_defect".into();
     }
     p

@@ -50,11 +50,19 @@ pub enum Kind {
     Camera,
     /// 1 to 3.5 million counts.
     Few,
+    /// Without defects.
+    Healthy,
+    /// Half of the apex dark.
+    HalfApex,
+    /// One segment of the apex dark, with its tip or without.
+    OneApex,
+    /// The apex and a territory dark.
+    ApexPlus,
 }
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Kind; 20] = [
+    pub const ALL: [Kind; 24] = [
         Kind::In,
         Kind::Motion,
         Kind::Rv,
@@ -75,6 +83,10 @@ impl Kind {
         Kind::Cut,
         Kind::Camera,
         Kind::Few,
+        Kind::Healthy,
+        Kind::HalfApex,
+        Kind::OneApex,
+        Kind::ApexPlus,
     ];
 
     /// The kinds that the judgement was calibrated with.
@@ -103,6 +115,10 @@ impl Kind {
             Kind::Cut => "cut",
             Kind::Camera => "camera",
             Kind::Few => "few",
+            Kind::Healthy => "healthy",
+            Kind::HalfApex => "halfapex",
+            Kind::OneApex => "oneapex",
+            Kind::ApexPlus => "apexplus",
         }
     }
 
@@ -184,6 +200,10 @@ fn profile(kind: Kind, d: &mut Draws, sampling: Sampling) -> Profile {
             counts_m: d.uniform(0.5, 2.0),
             ..usual
         },
+        Kind::Healthy => Profile {
+            defects: 0,
+            ..usual
+        },
         Kind::Few => Profile {
             counts_m: d.uniform(1.0, 3.5),
             ..usual
@@ -261,6 +281,25 @@ fn alter(kind: Kind, d: &mut Draws, p: &mut Parameters) {
                 &[13, 14, 15, 16, 17]
             };
             p.heart.defects = vec![Defect::scar(segments, d.uniform(0.8, 1.0), 0.7, 0.2)];
+        }
+        Kind::HalfApex => {
+            let halves: [&[usize]; 4] =
+                [&[13, 14, 17], &[14, 15, 17], &[15, 16, 17], &[13, 16, 17]];
+            let half = *d.pick(&halves);
+            p.heart.defects = vec![Defect::scar(half, d.uniform(0.85, 1.0), 0.7, 0.2)];
+        }
+        Kind::OneApex => {
+            let mut segments = vec![13 + d.index(4)];
+            if d.chance(0.5) {
+                segments.push(17);
+            }
+            p.heart.defects = vec![Defect::scar(&segments, d.uniform(0.85, 1.0), 0.7, 0.2)];
+        }
+        Kind::ApexPlus => {
+            let territory = d.pick(&TERRITORIES).whole;
+            let beside = territory.iter().copied().filter(|segment| *segment < 13);
+            let segments: Vec<usize> = (13..=17).chain(beside).collect();
+            p.heart.defects = vec![Defect::scar(&segments, d.uniform(0.85, 1.0), 0.6, 0.25)];
         }
         Kind::Infarct => {
             let count = 1 + d.index(2);

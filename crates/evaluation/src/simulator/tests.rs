@@ -203,8 +203,9 @@ fn walls_reach_from_thin_to_thick_and_other_cases_are_drawn() {
     }
     assert!(gated::draw("unknown", "g", 3, &order).is_none());
     let protocol = healthy::Protocol::from_name("rest_ac").expect("a protocol");
-    let one = healthy::draw("n", 4, true, &protocol, 64, true);
+    let one = healthy::draw("n", 4, true, &protocol, 64, Some(healthy::OneDefect::Basal));
     assert_eq!((one.sex, one.heart.defects.len()), ('F', 1));
+    assert!(one.heart.defects[0].segments[0] <= 6);
     assert!(one.reconstruction.attenuation_corrected);
 }
 
