@@ -10,10 +10,10 @@ COPY crates/store/Cargo.toml crates/store/
 COPY crates/http/Cargo.toml crates/http/
 COPY crates/http_client/Cargo.toml crates/http_client/
 COPY crates/python/Cargo.toml crates/python/
-COPY tools/Cargo.toml tools/
+COPY crates/evaluation/Cargo.toml crates/evaluation/
 # Not built, but Cargo.toml declares them and cargo looks for their files.
 COPY benches benches
-RUN for crate in . crates/* tools; do mkdir "$crate/src" && touch "$crate/src/lib.rs" || exit; done \
+RUN for crate in . crates/*; do mkdir "$crate/src" && touch "$crate/src/lib.rs" || exit; done \
  && echo 'fn main() {}' > src/main.rs \
  && cargo build --profile dist --locked --bin ventriform \
  && rm -rf src crates

@@ -24,5 +24,5 @@ if [ -z "${PYTHON:-}" ]; then
       xargs "$PYTHON" -m pip install --quiet --disable-pip-version-check
 fi
 PROGRAM=${PROGRAM:-target/debug/voxels}
-[ -x "$PROGRAM" ] || cargo build --quiet --package ventriform-program --package ventriform-tools --bin voxels --test layering
+[ -x "$PROGRAM" ] || cargo build --quiet --package ventriform-program --package ventriform-evaluation --bin voxels --test layering
 "$PYTHON" scripts/check/dicom_codecs.py "$PROGRAM" "$out"

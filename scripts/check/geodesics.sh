@@ -6,5 +6,5 @@
 # PYTHON: an interpreter that has numpy and pygeodesic.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cargo build --quiet --package ventriform-program --package ventriform-tools --bin geodesics --test layering
+cargo build --quiet --package ventriform-program --package ventriform-evaluation --bin geodesics --test layering
 exec "${PYTHON:-python3}" scripts/check/geodesics.py target/debug/geodesics "$@"

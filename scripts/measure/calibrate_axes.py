@@ -1,7 +1,7 @@
 """Estimates the scores below which axes of an image count as exchanged (AxisPair::flag_score of
 heart/judge/exchanged_axes.rs).
 
-    cargo build --release --bin ventriform && cargo build --release --package ventriform-tools --bin exchanged_axes
+    cargo build --release --bin ventriform && cargo build --release --package ventriform-evaluation --bin exchanged_axes
     python scripts/measure/calibrate_axes.py OUT [--cases 120] [--seed 1] [--also FOLDER...]
 
 Makes simulated scans of many sizes, spacings, livers and right ventricles in OUT (kept if they are there), and takes

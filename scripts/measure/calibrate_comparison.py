@@ -6,11 +6,11 @@
                                             writes
                                             crates/ventriform/src/heart/comparison/calibration.rs
 
-A table is what the tool `comparisons` prints; the committed one has the 20 pairs of seed 610
-of the simulator of pairs (no part of this project):
+A table is what the program `comparisons` prints; calibrate_all.py makes it. The committed one has 20 pairs of an older
+simulator with the same kinds. By itself:
 
-    make_pairs.py --out PAIRS --seed 610 --n 20 --gates 0
-    cargo run --release -p ventriform-tools --bin comparisons -- PAIRS/* > TABLE
+    cargo run --release -p ventriform-evaluation --bin simulate -- pairs --out PAIRS --seed 610 --n 20 --gates 0
+    cargo run --release -p ventriform-evaluation --bin comparisons -- PAIRS/* > TABLE
 
 - Deviation of the difference: root mean square over the pairs without reversible wall.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies

@@ -3,18 +3,18 @@
 
     calibrate_intervals.py --check [NAME TABLE]  how many true figures lie within the committed intervals; of the TABLE
                                                  NAME, `beats` or `volumes`, or of the committed ones
-    calibrate_intervals.py --write               estimates the constants from the committed tables and writes them
+    calibrate_intervals.py --write [NAME...]     estimates the constants from the committed tables (or from these) and
+                                                 writes them
 
-The tables are what the tools `beats` and `volumes` print. scripts/measure/calibration/beats.csv, for
-crates/ventriform/src/heart/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
-simulator of gated hearts; scripts/measure/calibration/volumes.csv, for
-crates/ventriform/src/heart/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans
-(neither is part of this project):
+The tables are what the programs `beats` and `volumes` print; calibrate_all.py makes them. beats.csv of
+scripts/measure/calibration, for crates/ventriform/src/heart/beat/calibration.rs, has 40 gated studies; volumes.csv, for
+crates/ventriform/src/heart/judge/volume_calibration.rs, 118 scans. The committed tables are of an older simulator with
+the same kinds of hearts. One table after the other:
 
-    gated.py --out CASES --seed 500 --n 20
-    cargo run --release -p ventriform-tools --bin beats -- CASES/* > TABLE
-    make_cases.py --out CASES --seed 5001 --n 118
-    cargo run --release -p ventriform-tools --bin volumes -- CASES > TABLE
+    cargo run --release -p ventriform-evaluation --bin simulate -- gated --out CASES --seed 500 --n 20
+    cargo run --release -p ventriform-evaluation --bin beats -- CASES/* > TABLE
+    cargo run --release -p ventriform-evaluation --bin simulate -- cases --out CASES --seed 5001 --n 118
+    cargo run --release -p ventriform-evaluation --bin volumes -- CASES > TABLE
 
 An error is found minus true (EF, points) or found over true minus 1 (volumes). Its variance is usual^2 + (dark share)^2
 + (small 60 ml / cavity)^2, by maximum likelihood of a normal distribution.
@@ -122,7 +122,7 @@ def write(name):
     of, cavity, dark = errors(name, TABLES / f"{name}.csv")
     text = (
         f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse "
-        f"crate::numeric::error_terms::ErrorTerms;\n"
+        f"crate::base::numeric::error_terms::ErrorTerms;\n"
     )
     for constant, (_, doc) in figures.items():
         terms = zip(TERMS, estimate(of[constant], cavity, dark))
@@ -134,12 +134,12 @@ def write(name):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", nargs="*", metavar="NAME TABLE", help="a table as `beats` or `volumes` prints it")
-    parser.add_argument("--write", action="store_true", help="write the constants")
+    parser.add_argument("--write", nargs="*", choices=FILES, metavar="NAME", help="write the constants")
     arguments = parser.parse_args()
     if arguments.check and (len(arguments.check) != 2 or arguments.check[0] not in FILES):
         parser.error("--check: give `beats` or `volumes` and a table, or nothing")
-    if arguments.write:
-        for name in FILES:
+    if arguments.write is not None:
+        for name in arguments.write or FILES:
             write(name)
     if arguments.check:
         report(*arguments.check)

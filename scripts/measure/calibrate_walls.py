@@ -8,11 +8,11 @@
 
 The files are heart/deform/calibration.rs and heart/judge/uncertainty_calibration.rs of crates/ventriform/src.
 The tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are
-made by
+made by calibrate_all.py, which lists the sets, or one set after the other by
 
-    make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
-    cargo run --release -p ventriform-tools --bin wall_features -- TABLES COHORT CASES/SET...
-    cargo run --release -p ventriform-tools --bin smoothness_features -- TABLES/smoothness.csv COHORT CASES/SET...
+    cargo run --release -p ventriform-evaluation --bin simulate -- cases --out CASES/SET --seed SET --n N [--kinds ...]
+    cargo run --release -p ventriform-evaluation --bin wall_features -- TABLES CASES/SET...
+    cargo run --release -p ventriform-evaluation --bin smoothness_features -- TABLES/smoothness.csv CASES/SET...
 
 - RIM_SHAPE: mean and inverse covariance of the harmonics of the true rims, each by least squares, over the heart's
   length.
@@ -50,12 +50,13 @@ NODES = ROOT / "crates/ventriform/src/heart/judge/uncertainty_calibration.rs"
 TABLES = ROOT / "scripts/measure/calibration"
 
 REPRODUCED = """\
-The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with
+The committed tables are of an older simulator with the same kinds of scans (the simulator's figures beside it:
+docs/log/simulator.md): its cohort and the scans with a heart, not refused, of seeds 411 and 701 with
 42 scans of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and
 2104 with 14 of all kinds. signal_ends.csv has the cohort, the first scans of seeds 9001 and 9101
 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct) and 94 of seed 9111
 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,in,infarct,apex) on 64 x 64 pixels of 6.4, 6.0 and 6.8 mm in
-turn, as make_cases.draw and simulate.N, NF = 64, 128 make them. smoothness.csv has the cohort and every third scan of
+turn. smoothness.csv has the cohort and every third scan of
 the first 118 of seed 5001. docs/log/walls.md says how far the estimate is from the committed constants, and why: do
 not --write it without judging the fits anew, since every result depends on them."""
 

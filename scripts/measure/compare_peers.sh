@@ -47,7 +47,7 @@ if [ -e "$site/lib64/libgeogram.a" ]; then
 fi
 [ -d /usr/include/CGAL ] && cpp cgal -I/usr/include/eigen3 -lgmp -lmpfr
 
-cargo build --release --quiet --package ventriform-program --package ventriform-tools --bin ventriform --bin stopwatch
+cargo build --release --quiet --package ventriform-program --package ventriform-evaluation --bin ventriform --bin stopwatch
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 VTK_SMP_MAX_THREADS=1
 exec "$PYTHON" scripts/measure/compare_peers.py --work "$work" --docs docs \
     --binaries "${CARGO_TARGET_DIR:-target}/release" --rounds "${ROUNDS:-15}" ${CORE:+--core "$CORE"} "$@"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Judges beats of simulated gated studies by their truth, beside the goals.
 
-    judge_beats.py PROGRAM CASES...       CASES are folders of the simulator of gated hearts (no part of this project),
+    judge_beats.py PROGRAM CASES...       CASES are folders of the simulator of gated hearts (`simulate gated`),
                                           each with
                                           spect.nii.gz's gates in gated.nii.gz and the truth in params.json
 

@@ -1,16 +1,16 @@
 """Flags judged on simulated hearts: dark apices, images that were cut and resliced, and files whose sides are
 exchanged.
 
-    python scripts/measure/judge_flags.py SIMULATOR OUT --apices SEED                makes hearts whose apex is dark in
-                                                                                     whole or in part, and healthy ones
-    python scripts/measure/judge_flags.py SIMULATOR OUT --cuts SEED --cases CASE...  cuts images of cases at four sides,
-                                                                                     and reslices them obliquely
-    python scripts/measure/judge_flags.py SIMULATOR OUT --mirrored --cases CASE...   exchanges left and right of cases
-    python scripts/measure/judge_flags.py SIMULATOR OUT --judge [--program target/release/ventriform]
+    python scripts/measure/judge_flags.py OUT --apices SEED                makes hearts whose apex is dark in whole or in
+                                                                           part, and healthy ones
+    python scripts/measure/judge_flags.py OUT --cuts SEED --cases CASE...  cuts images of cases at four sides, and
+                                                                           reslices them obliquely
+    python scripts/measure/judge_flags.py OUT --mirrored --cases CASE...   exchanges left and right of cases
+    python scripts/measure/judge_flags.py OUT --judge [--programs target/release]
 
-SIMULATOR is the folder of make_cases.py. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the
-truth beside it, the error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in
-OUT; what is there already is kept.
+--apices takes the program `simulate`. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the truth
+beside it, the error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in OUT; what
+is there already is kept.
 """
 
 import argparse
@@ -18,49 +18,18 @@ import glob
 import json
 import os
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
 
-HALVES = [[13, 14, 17], [14, 15, 17], [15, 16, 17], [13, 16, 17]]
-COUNTS = {"whole": 4, "half": 4, "single": 4, "plus": 4, "healthy": 6}
+APICES = "apex,halfapex,oneapex,apexplus,healthy"
+NUMBER = 22
 CUT_DEPTH_MM, CONSTANT = 8, 17
 
 
-def make_apices(simulator, out, seed):
-    sys.path.insert(0, simulator)
-    import make_cases
-    import simulate
-
-    number = 0
-    for kind, count in COUNTS.items():
-        for n in range(count):
-            number += 1
-            name = f"{kind}{seed}_{n:03d}"
-            if os.path.exists(f"{out}/{name}/params.json"):
-                continue
-            rng = np.random.default_rng([seed, number, 78])
-            drawn, _, matrix = make_cases.draw("in", rng)
-            drawn["n_def"] = 0
-            drawn["edv"] = float(rng.uniform(60, 170))
-            severity = rng.uniform(0.85, 1)
-            territories = list(make_cases.TERRITORY.values())
-            defects = {
-                "whole": lambda: [make_cases.defect([13, 14, 15, 16, 17], severity, 0.7)],
-                "half": lambda: [make_cases.defect(HALVES[n], severity, 0.7)],
-                "single": lambda: [make_cases.defect([13 + n] if n % 2 == 0 else [13 + n, 17], severity, 0.7)],
-                "plus": lambda: [
-                    make_cases.defect(sorted({13, 14, 15, 16, 17, *territories[n % 3]}), severity, 0.6, 0.25)
-                ],
-                "healthy": list,
-            }[kind]()
-            simulate.N, simulate.NF = matrix, 2 * matrix
-            parameters = simulate.draw_case(name, 1_000_000 + 1000 * seed + number, drawn)
-            parameters["acquisition"]["matrix"] = matrix
-            parameters["made"] = kind
-            parameters["heart"]["defects"] = defects
-            simulate.simulate_case(parameters, f"{out}/{name}")
+def make_apices(programs, out, seed):
+    command = [f"{programs}/simulate", "cases", "--seed", str(seed), "--n", str(NUMBER), "--kinds", APICES]
+    subprocess.run([*command, "--out", out], check=True)
 
 
 def turn(rng):
@@ -159,24 +128,22 @@ def judge(out, program):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("simulator")
     parser.add_argument("out")
     parser.add_argument("--cases", nargs="*", default=[])
     parser.add_argument("--apices", type=int)
     parser.add_argument("--cuts", type=int)
     parser.add_argument("--mirrored", action="store_true")
     parser.add_argument("--judge", action="store_true")
-    parser.add_argument("--program", default="target/release/ventriform")
+    parser.add_argument("--programs", default="target/release", help="folder of simulate and ventriform")
     given = parser.parse_args()
-    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     if given.apices is not None:
-        make_apices(given.simulator, given.out, given.apices)
+        make_apices(given.programs, given.out, given.apices)
     if given.cuts is not None:
         make_cuts(given.out, given.cuts, given.cases)
     if given.mirrored:
         make_mirrored(given.out, given.cases)
     if given.judge:
-        judge(given.out, given.program)
+        judge(given.out, f"{given.programs}/ventriform")
 
 
 if __name__ == "__main__":

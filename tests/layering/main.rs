@@ -20,7 +20,7 @@ const CRATE_USES: &[(&str, &[&str])] = &[
     ("crates/http_client", &["ventriform-service"]),
     ("crates/http", &["ventriform", "ventriform-service"]),
     ("crates/python", &["ventriform"]),
-    ("tools", &["ventriform"]),
+    ("crates/evaluation", &["ventriform"]),
     (
         ".",
         &[

@@ -14,7 +14,7 @@ import time
 
 
 class Ours:
-    """The tool `stopwatch` as a running process; see tools/src/bin/stopwatch.rs."""
+    """The tool `stopwatch` as a running process; see crates/evaluation/src/bin/stopwatch.rs."""
 
     def __init__(self, binary, threads=1):
         environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))

@@ -1,5 +1,5 @@
 //! Quality of models, as figures that may not get worse: distances to the surface that the scan would
-//! have without noise, and shapes. `cargo run --release -p ventriform-tools --bin truth` judges
+//! have without noise, and shapes. `cargo run --release -p ventriform-evaluation --bin truth` judges
 //! more of them.
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.

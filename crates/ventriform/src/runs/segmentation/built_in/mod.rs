@@ -2,7 +2,7 @@
 //!
 //! They are models like any other, generated from phantoms without noise and without neighbouring
 //! organs, with the apparent edge of a blurred wall like the models of real scans. Making them takes
-//! seconds, so they are embedded: `cargo run --release -p ventriform-tools --bin built_in >
+//! seconds, so they are embedded: `cargo run --release -p ventriform-evaluation --bin built_in >
 //! crates/ventriform/src/runs/segmentation/built_in/hearts.json` makes the file again, and a test compares it with the
 //! phantoms. The cup of each is embedded as well, because finding it takes as long as a fit.
 //!

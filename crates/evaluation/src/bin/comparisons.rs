@@ -1,0 +1,100 @@
+//! Comparisons of rest and stress beside the truth of simulated pairs.
+//!
+//! ```sh
+//! cargo run --release --package ventriform-evaluation --bin comparisons -- PAIR...
+//! ```
+//!
+//! Every PAIR is a folder with stress/spect.nii.gz, rest/spect.nii.gz and pair.json, as the simulator of pairs writes
+//! them. Prints a row for each pair, ready for scripts/measure/calibrate_comparison.py: the ratio of the cavities of
+//! the anatomical wall and of the wall as it looks, that of the muscle, the deviation of the difference over the wall,
+//! the reversible share, the territory that has most of it, and flags.
+
+use anyhow::{Result, anyhow};
+use serde_json::Value;
+use std::path::Path;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::parameters::ComparisonParameters;
+use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
+
+fn main() -> Result<()> {
+    println!(
+        "pair,kind,comparable,true_tid,tid,tid_apparent,muscle,resolution_stress,resolution_rest,turn,turn_gain,correlation,matched,\
+         sd_points,reversible,true_reversible,territory,true_territory,fixed,flags"
+    );
+    for folder in std::env::args().skip(1) {
+        match row(Path::new(&folder)) {
+            Ok(row) => println!("{row}"),
+            Err(error) => eprintln!("{folder} is left out: {error:#}"),
+        }
+    }
+    Ok(())
+}
+
+fn row(folder: &Path) -> Result<String> {
+    let truth: Value = serde_json::from_slice(&std::fs::read(folder.join("pair.json"))?)?;
+    let files = |scan: &str| vec![VolumeFile::at(folder.join(scan).join("spect.nii.gz"))];
+    let (stress, rest) = (files("stress"), files("rest"));
+    let parameters = ComparisonParameters::default();
+    let order = ComparisonOrder {
+        stress: &stress,
+        rest: &rest,
+        auto: true,
+        models: Vec::new(),
+        normals: None,
+        parameters: &parameters,
+    };
+    let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())
+        .map_err(|error| anyhow!("{error}"))?;
+    let change = &made.change;
+    let apparent = |heart: &ComparedHeart| {
+        let surfaces = heart.segmentation().fit.model.surfaces.as_ref();
+        surfaces.map_or(f64::NAN, |both| both.apparent.wall.cavity_ml)
+    };
+    let worst = (change.territories.iter())
+        .max_by(|a, b| {
+            a.figures
+                .reversible_percent
+                .total_cmp(&b.figures.reversible_percent)
+        })
+        .filter(|worst| worst.figures.reversible_percent > 0.0);
+    let mut flags: Vec<&str> = made.flags.iter().map(|flag| flag.code()).collect();
+    flags.dedup();
+    Ok(format!(
+        "{},{},{},{},{:.3},{:.3},{:.3},{:.2},{:.2},{:.1},{:.3},{:.3},{:.0},{:.2},{:.1},{},{},{},{:.1},{}",
+        truth["pair"].as_str().unwrap_or_default(),
+        truth["kind"].as_str().unwrap_or_default(),
+        truth["comparable"],
+        truth["tid"],
+        made.tid(),
+        apparent(&made.stress) / apparent(&made.rest),
+        made.stress.muscle_ml() / made.rest.muscle_ml(),
+        made.stress.resolution_mm().unwrap_or(f64::NAN),
+        made.rest.resolution_mm().unwrap_or(f64::NAN),
+        change.turn.degrees,
+        change.turn.gain,
+        change.turn.correlation,
+        change.matched_percent,
+        deviation(&made),
+        change.reversible_percent,
+        truth["reversible_percent"],
+        worst.map_or("", |worst| worst.name),
+        truth["reversible"]["territory"]
+            .as_str()
+            .unwrap_or_default(),
+        change.fixed_percent,
+        flags.join(" ")
+    ))
+}
+
+/// Root mean square of the difference over the compared places, points.
+fn deviation(made: &ComparedHearts) -> f64 {
+    let known: Vec<f64> = made
+        .change
+        .difference_points
+        .iter()
+        .flatten()
+        .copied()
+        .collect();
+    (known.iter().map(|d| d * d).sum::<f64>() / known.len() as f64).sqrt()
+}
