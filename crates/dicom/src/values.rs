@@ -1,8 +1,8 @@
 //! Which texts are values of their representation (PS3.5 6.2 and 9.1).
 //!
-//! In: a text, as a file states it. Out: dates, times and the patient's sex as the standard writes them, identifiers, and
-//! as much of a longer text as its representation may have. A file may hold anything; an archive refuses an object with
-//! another value, or files it where nobody finds it.
+//! In: a text, as a file states it. Out: dates, times and the patient's sex as the standard writes them, identifiers,
+//! and as much of a longer text as its representation may have. A file may hold anything; an archive refuses an object
+//! with another value, or files it where nobody finds it.
 
 /// Longest UID, characters.
 const LONGEST_UID: usize = 64;

@@ -15,6 +15,7 @@ use super::posture;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_PIXEL_SPACING, ORIENTATION,
     PIXEL_SPACING, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
@@ -85,37 +86,33 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
 }
 
 /// Distance of rows and distance of columns, mm, of `frame` or of the whole file.
-pub(super) fn pixel_spacing(a: &Attributes, frame: Option<usize>) -> Result<[f64; 2], VolumeError> {
+pub(super) fn pixel_spacing(a: &Attributes, frame: Option<usize>) -> Result<[f64; 2], ReadError> {
     let stated = match a.decimals_of(FRAME_PIXEL_SPACING, frame)? {
         Some(spacing) => Some(spacing),
         None => a.decimals(PIXEL_SPACING)?,
     };
     let Some([between_rows, between_columns]) = stated else {
-        return Err(a.missing(PIXEL_SPACING).into());
+        return Err(a.missing(PIXEL_SPACING));
     };
     if between_rows > 0.0 && between_columns > 0.0 {
         Ok([between_rows, between_columns])
     } else {
-        Err(a
-            .wrong(
-                PIXEL_SPACING.name,
-                &format!("{between_rows}\\{between_columns}"),
-                "expected positive numbers".into(),
-            )
-            .into())
+        Err(a.wrong(
+            PIXEL_SPACING.name,
+            &format!("{between_rows}\\{between_columns}"),
+            "expected positive numbers".into(),
+        ))
     }
 }
 
 /// Signed distance of slices along row x column, mm.
-fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, VolumeError> {
+fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, ReadError> {
     match a.decimals(SPACING_BETWEEN_SLICES)? {
-        Some([0.0]) => Err(a
-            .wrong(
-                SPACING_BETWEEN_SLICES.name,
-                "0",
-                "slices must lie at different positions".into(),
-            )
-            .into()),
+        Some([0.0]) => Err(a.wrong(
+            SPACING_BETWEEN_SLICES.name,
+            "0",
+            "slices must lie at different positions".into(),
+        )),
         Some([spacing]) => Ok(spacing),
         None => match a.decimals(SLICE_THICKNESS)? {
             Some([thickness]) if thickness > 0.0 => {
@@ -125,25 +122,23 @@ fn slice_spacing(a: &Attributes, warnings: &mut Vec<String>) -> Result<f64, Volu
                 ));
                 Ok(thickness)
             }
-            _ => Err(a.missing(SPACING_BETWEEN_SLICES).into()),
+            _ => Err(a.missing(SPACING_BETWEEN_SLICES)),
         },
     }
 }
 
 /// Unit vectors along a row (toward higher columns) and along a column (toward higher rows).
-pub(super) fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), VolumeError> {
+pub(super) fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec3), ReadError> {
     let [x0, x1, x2, y0, y1, y2] = cosines;
     let (x, y) = (Vec3::new(x0, x1, x2), Vec3::new(y0, y1, y2));
     let unit = |v: &Vec3| (v.norm() - 1.0).abs() <= COSINE_SLACK;
     if unit(&x) && unit(&y) && x.dot(&y).abs() <= COSINE_SLACK {
         Ok((x.normalize(), y.normalize()))
     } else {
-        Err(a
-            .wrong(
-                DETECTOR_ORIENTATION.name,
-                &format!("{cosines:?}"),
-                "expected two perpendicular unit vectors".into(),
-            )
-            .into())
+        Err(a.wrong(
+            DETECTOR_ORIENTATION.name,
+            &format!("{cosines:?}"),
+            "expected two perpendicular unit vectors".into(),
+        ))
     }
 }

@@ -11,6 +11,7 @@ use crate::base::progress::Monitor;
 use crate::base::text::hex;
 use sha2::{Digest, Sha256};
 use std::fmt;
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     ACQUISITION_TIME, Attribute, Attributes, COLUMNS, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
     ORIENTATION, PIXEL_SPACING, ROWS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_CLASS,
@@ -134,19 +135,17 @@ fn gates_key(a: &Attributes) -> String {
 
 /// A UID that the object must have. Zeros before a number are accepted: objects are told apart by them all the
 /// same, and what is made of such an object does not name it.
-fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
+fn uid(a: &Attributes, attribute: Attribute) -> Result<String, ReadError> {
     let text = a.text(attribute).ok_or_else(|| a.missing(attribute))?;
     let number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
     if text.len() <= LONGEST_UID && text.split('.').all(number) {
         Ok(text)
     } else {
-        Err(a
-            .wrong(
-                attribute.name,
-                &text,
-                format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
-            )
-            .into())
+        Err(a.wrong(
+            attribute.name,
+            &text,
+            format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
+        ))
     }
 }
 

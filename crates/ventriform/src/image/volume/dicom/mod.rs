@@ -9,8 +9,8 @@
 //!    `company`: beside others it is left out.
 //! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `posture`: what
 //!    else says how they lie in the patient.
-//!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
-//!    one place belong together. `segments`: labels. `gate_series`: files or series of one gate each.
+//!    `stack`: orders and places all other frames by their positions. `segments`: labels. `gate_series`: files or
+//!    series of one gate each.
 //!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
 //! 4. `pixels`: checks the pixel format and decodes frame by frame ([`ventriform_dicom::codec`]).
 //! 5. `provenance`: patient, study, series, instances and acquisition; `rest_stress`: which scan of a study they name.
@@ -37,7 +37,6 @@ mod segments;
 mod stack;
 mod stored;
 mod timing;
-mod volumes;
 
 #[cfg(test)]
 mod tests;
@@ -52,7 +51,6 @@ use self::scans::Scans;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
 use self::stored::StoredDataSet;
-use self::volumes::Marks;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
 use super::gate_timing::GateTiming;
@@ -66,6 +64,7 @@ use crate::image::grid::gates::GATE_COUNTS;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::mem;
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
     NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE,
@@ -74,6 +73,7 @@ use ventriform_dicom::read::attributes::{
 use ventriform_dicom::read::frames::FrameOrder;
 use ventriform_dicom::read::kind::Kind;
 use ventriform_dicom::read::scan::{self, Scan};
+use ventriform_dicom::read::volumes::Marks;
 use ventriform_dicom::values::is_uid;
 
 /// DICOM files whose attributes have been read and checked.
@@ -399,15 +399,13 @@ fn check_numbers(
     a: &Attributes,
     order: &FrameOrder,
     warnings: &mut Vec<String>,
-) -> Result<(), VolumeError> {
+) -> Result<(), ReadError> {
     let (slices, gates) = (order.slices(), order.gates());
     let stated = |attribute| a.shorts(attribute).first().map(|n| usize::from(*n));
     if let Some(stated) = stated(NUMBER_OF_SLICES) {
         if stated > slices {
             let reason = format!("the frames hold {slices} slices; slices are missing");
-            return Err(a
-                .wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason)
-                .into());
+            return Err(a.wrong(NUMBER_OF_SLICES.name, &stated.to_string(), reason));
         }
         if stated < slices {
             warnings.push(format!(
@@ -425,7 +423,7 @@ fn check_numbers(
         if stated > held {
             let reason =
                 format!("the frames hold {held} {what} ({gates} gates); gates are missing");
-            return Err(a.wrong(number.name, &stated.to_string(), reason).into());
+            return Err(a.wrong(number.name, &stated.to_string(), reason));
         }
     }
     Ok(())
@@ -450,7 +448,7 @@ fn attenuation_warning(a: &Attributes) -> Option<String> {
 }
 
 /// Checks that the functional groups do not describe more frames than there are.
-fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
+fn check_groups(a: &Attributes, frames: usize) -> Result<(), ReadError> {
     let described = a.frames_described();
     if described > frames {
         Err(a.wrong(
@@ -459,7 +457,7 @@ fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
             format!(
                 "the Per-frame Functional Groups Sequence (5200,9230) describes {described} frames"
             ),
-        ).into())
+        ))
     } else {
         Ok(())
     }

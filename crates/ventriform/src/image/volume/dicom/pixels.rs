@@ -10,6 +10,7 @@ use super::stored::StoredDataSet;
 use crate::base::progress::Cancelled;
 use ventriform_dicom::Endianness;
 use ventriform_dicom::codec::{self, FrameError, FrameLayout};
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, DOUBLE_PADDING, DOUBLE_PADDING_LIMIT,
     FLOAT_PADDING, FLOAT_PADDING_LIMIT, FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT,
@@ -369,26 +370,26 @@ impl BitRow {
 }
 
 /// Refuses pictures in colour.
-fn check_colours(a: &Attributes) -> Result<(), VolumeError> {
+fn check_colours(a: &Attributes) -> Result<(), ReadError> {
     let samples = a.shorts(SAMPLES).first().copied().unwrap_or(1);
     if samples != 1 {
         let reason = "expected 1: colour images are not supported".into();
-        return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason).into());
+        return Err(a.wrong(SAMPLES.name, &samples.to_string(), reason));
     }
     match a.text(PHOTOMETRIC) {
         Some(meaning) if !meaning.starts_with("MONOCHROME") => {
             let reason = "expected MONOCHROME1 or MONOCHROME2".into();
-            Err(a.wrong(PHOTOMETRIC.name, &meaning, reason).into())
+            Err(a.wrong(PHOTOMETRIC.name, &meaning, reason))
         }
         _ => Ok(()),
     }
 }
 
-fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
+fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, ReadError> {
     let frames = match a.decimals(NUMBER_OF_FRAMES)? {
         Some([frames]) => frames,
         None if matches!(kind, Kind::Nuclear { .. }) => {
-            return Err(a.missing(NUMBER_OF_FRAMES).into());
+            return Err(a.missing(NUMBER_OF_FRAMES));
         }
         None => 1.0,
     };
@@ -401,14 +402,12 @@ fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
     if frames.fract() == 0.0 && (1.0..=most).contains(&frames) {
         Ok(frames as usize)
     } else {
-        Err(a
-            .wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into())
-            .into())
+        Err(a.wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into()))
     }
 }
 
 /// The data type, and the number of leading bits that are not part of the value.
-fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
+fn data_type(scan: &Scan) -> Result<(DataType, u32), ReadError> {
     let a = &scan.attributes;
     match scan.element {
         PixelElement::Integer => {}
@@ -424,16 +423,14 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         1 => true,
         other => {
             let reason = "expected 0 (unsigned) or 1 (signed)".into();
-            return Err(a
-                .wrong(PIXEL_REPRESENTATION.name, &other.to_string(), reason)
-                .into());
+            return Err(a.wrong(PIXEL_REPRESENTATION.name, &other.to_string(), reason));
         }
     };
     let data_type = match (allocated, signed) {
         // Two 8-bit pixels share a word in swapped order.
         (8, _) if a.byte_order == Endianness::Big && scan.words => {
             let reason = "8-bit pixels in big endian words are not supported".into();
-            return Err(a.wrong(BITS_ALLOCATED.name, "8", reason).into());
+            return Err(a.wrong(BITS_ALLOCATED.name, "8", reason));
         }
         (8, false) => DataType::U8,
         (8, true) => DataType::I8,
@@ -443,22 +440,18 @@ fn data_type(scan: &Scan) -> Result<(DataType, u32), VolumeError> {
         (32, true) => DataType::I32,
         (other, _) => {
             let reason = "expected 8, 16 or 32".into();
-            return Err(a
-                .wrong(BITS_ALLOCATED.name, &other.to_string(), reason)
-                .into());
+            return Err(a.wrong(BITS_ALLOCATED.name, &other.to_string(), reason));
         }
     };
     let stored = a.shorts(BITS_STORED).first().copied().unwrap_or(allocated);
     if stored == 0 || stored > allocated {
         let reason = format!("expected 1 to {allocated} (Bits Allocated)");
-        return Err(a
-            .wrong(BITS_STORED.name, &stored.to_string(), reason)
-            .into());
+        return Err(a.wrong(BITS_STORED.name, &stored.to_string(), reason));
     }
     let high_bit = a.shorts(HIGH_BIT).first().copied().unwrap_or(stored - 1);
     if high_bit != stored - 1 {
         let reason = format!("expected {} (Bits Stored - 1)", stored - 1);
-        return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason).into());
+        return Err(a.wrong(HIGH_BIT.name, &high_bit.to_string(), reason));
     }
     Ok((data_type, u32::from(allocated - stored)))
 }
@@ -470,17 +463,15 @@ fn check_surplus(
     voxels: u64,
     length: u64,
     bytes: u64,
-) -> Result<(), VolumeError> {
+) -> Result<(), ReadError> {
     let of_one = (bytes / frames as u64).max(1);
     let held = length / of_one;
     if voxels > 0 && held > frames as u64 && length - bytes >= of_one.max(2) {
-        Err(a
-            .wrong(
-                NUMBER_OF_FRAMES.name,
-                &frames.to_string(),
-                format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
-            )
-            .into())
+        Err(a.wrong(
+            NUMBER_OF_FRAMES.name,
+            &frames.to_string(),
+            format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
+        ))
     } else {
         Ok(())
     }
@@ -553,7 +544,7 @@ fn single(number: f64) -> f64 {
 
 /// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the Real
 /// World Value Mapping; `None` if there is neither or they change nothing. A slope of 0 is one of an empty slice.
-fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError> {
+fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, ReadError> {
     let rescale = [
         (FRAME_RESCALE_SLOPE, FRAME_RESCALE_INTERCEPT),
         (RESCALE_SLOPE, RESCALE_INTERCEPT),
@@ -567,7 +558,7 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
     }
     if found.is_none() && !a.shorts(MODALITY_TABLE).is_empty() {
         let reason = "values by a table are not supported; expected Rescale Slope".into();
-        return Err(a.wrong(MODALITY_TABLE.name, "present", reason).into());
+        return Err(a.wrong(MODALITY_TABLE.name, "present", reason));
     }
     if found.is_none() {
         let mapping = a.mappings.linear(frame);
@@ -582,7 +573,7 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
     if !slope.is_finite() || (slope == 0.0 && !is_rescale) || !inter.is_finite() {
         let value = format!("{slope} (intercept {inter})");
         let reason = "expected a finite slope other than 0 and a finite intercept".into();
-        return Err(a.wrong(field, &value, reason).into());
+        return Err(a.wrong(field, &value, reason));
     }
     Ok(((slope, inter) != (1.0, 0.0)).then_some((slope, inter)))
 }

@@ -17,8 +17,8 @@
 //! Not told by any attribute: which side of short-axis slices the septum lies on where their directions are not the
 //! patient's.
 
-use super::super::VolumeError;
 use crate::base::geometry::Vec3;
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     Attribute, Attributes, DETECTOR_VIEW, DETECTOR_VIEW_MEANING, GANTRY, GANTRY_MEANING,
     PATIENT_LETTERS, PATIENT_POSITION, POSTURE, POSTURE_MEANING, PROGRESSION, VIEW, VIEW_MEANING,
@@ -326,8 +326,8 @@ fn view(a: &Attributes) -> Option<Said<View>> {
 /// The directions of rows and columns of a file without Image Orientation (Patient).
 ///
 /// # Errors
-/// [`VolumeError::Field`] if two attributes contradict each other on how the patient lay.
-pub(super) fn assumed(a: &Attributes) -> Result<Assumed, VolumeError> {
+/// [`ReadError::Field`] if two attributes contradict each other on how the patient lay.
+pub(super) fn assumed(a: &Attributes) -> Result<Assumed, ReadError> {
     const WITHOUT: &str = "The file has no Image Orientation (Patient)";
     let of = |[x, y]: [Vec3; 2]| [x.x, x.y, x.z, y.x, y.y, y.z];
     if let Some((said, true)) = letters(a) {
@@ -358,7 +358,7 @@ pub(super) fn assumed(a: &Attributes) -> Result<Assumed, VolumeError> {
                 "without it the patient's position tells how the slices lie, and {reason}; send the file with Image \
                  Orientation (Patient), or with one of both removed"
             ),
-        ).into());
+        ));
     }
     let mut warning = if position.cited.is_empty() {
         format!("{WITHOUT}: axial slices of a supine patient are assumed.")

@@ -7,7 +7,8 @@
 //!
 //! 1. All frames must have the same directions and pixel spacing.
 //! 2. Positions along row x column, rising, are the slices; positions closer than 0.01 mm are one.
-//! 3. Several frames at every position are several volumes: `volumes` tells which belong together.
+//! 3. Several frames at every position are several volumes: [`ventriform_dicom::read::volumes`] tells which belong
+//!    together.
 //! 4. Neighbouring slices must lie equally far apart. The step from one to the next is taken from the
 //!    positions, so that it may be oblique to the slices (a tilted gantry).
 //!
@@ -18,7 +19,6 @@ use super::super::facts::AffineSource;
 use super::super::open::Placement;
 use super::geometry::{directions, pixel_spacing};
 use super::posture;
-use super::volumes::{Marks, deal};
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
@@ -29,6 +29,7 @@ use ventriform_dicom::read::attributes::{
     SPACING_BETWEEN_SLICES,
 };
 use ventriform_dicom::read::kind::is_nuclear;
+use ventriform_dicom::read::volumes::{Marks, deal};
 
 /// Positions closer than this are the same, mm.
 const SAME_POSITION: f64 = 0.01;
@@ -367,8 +368,8 @@ fn check_steps(position: &dyn Fn(usize) -> Vec3, slices: usize, step: Vec3) -> R
 
 #[cfg(test)]
 mod tests {
-    use super::super::volumes::Mark;
     use super::*;
+    use ventriform_dicom::read::volumes::Mark;
 
     fn name(frame: usize) -> String {
         format!("frame {frame}")
@@ -383,7 +384,7 @@ mod tests {
             oriented: true,
             notes: Vec::new(),
             spacing: [2.0, 3.0],
-            marks: Marks::from([Mark::time(rank)]),
+            marks: Marks::from([Mark::trigger_time(rank)]),
         }
     }
 

@@ -7,6 +7,7 @@
 
 use super::super::VolumeError;
 use super::super::gate_timing::GateTiming;
+use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
     Attribute, Attributes, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE, FRAME_HIGH_RR,
     FRAME_INTERVALS_ACQUIRED, FRAME_INTERVALS_REJECTED, FRAME_LOW_RR, FRAME_RR_NOMINAL, FRAME_TIME,
@@ -137,11 +138,11 @@ fn number(
     a: &Attributes,
     attribute: Attribute,
     frame: Option<usize>,
-) -> Result<Option<f64>, VolumeError> {
+) -> Result<Option<f64>, ReadError> {
     match a.decimals_of::<1>(attribute, frame)? {
         Some([number]) if number < 0.0 => {
             let reason = "a duration or a count is 0 or more".to_owned();
-            Err(a.wrong(attribute.name, &number.to_string(), reason).into())
+            Err(a.wrong(attribute.name, &number.to_string(), reason))
         }
         Some([number]) => Ok(Some(number)),
         None => Ok(None),

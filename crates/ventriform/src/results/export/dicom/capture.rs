@@ -5,6 +5,7 @@ use crate::image::draw::Image;
 use crate::results::report::DrawnPage;
 use ventriform_dicom::tags;
 use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::image::PixelFormat;
 
 /// The pixels of a PNG file of an object; `name` names the object in errors.
 ///
@@ -60,15 +61,14 @@ pub(super) fn put(
         }
         set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
     }
-    set.short(tags::SAMPLES_PER_PIXEL, 3);
-    set.text(tags::PHOTOMETRIC_INTERPRETATION, "RGB");
-    set.short(tags::PLANAR_CONFIGURATION, 0);
-    set.short(tags::ROWS, rows);
-    set.short(tags::COLUMNS, columns);
-    set.short(tags::BITS_ALLOCATED, 8);
-    set.short(tags::BITS_STORED, 8);
-    set.short(tags::HIGH_BIT, 7);
-    set.short(tags::PIXEL_REPRESENTATION, 0);
+    let format = PixelFormat {
+        rows,
+        columns,
+        samples: 3,
+        photometric: "RGB",
+        bits: 8,
+    };
+    format.put(set);
     set.bytes(tags::PIXEL_DATA, image.pixels.into_flattened());
     Ok(())
 }

@@ -61,6 +61,7 @@ use crate::results::report::{
 use ventriform_dicom::write::EncodingError;
 use ventriform_dicom::write::code::Code;
 use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::segmentation::SegmentDescription;
 use ventriform_dicom::write::uid::Uids;
 use ventriform_dicom::{tags, uids};
 
@@ -409,8 +410,14 @@ impl<'a> DicomResults<'a> {
 
     /// The first segment: the structure, for its item in the Segment Sequence.
     fn put_segment(&self, segment: &mut DataSet) {
-        let Structure { kind, label, .. } = self.structure;
-        put_segment(segment, 1, kind, label, &self.tracking());
+        let description = SegmentDescription {
+            number: 1,
+            label: self.structure.label,
+            category: ANATOMICAL_STRUCTURE,
+            kind: self.structure.kind,
+            tracking_uid: &self.tracking(),
+        };
+        description.put(segment);
     }
 
     /// The Referenced Series Sequence of the Common Instance Reference module.
@@ -469,20 +476,6 @@ fn put_facts(
     set.text(tags::MANUFACTURER_MODEL_NAME, "ventriform");
     set.text(tags::DEVICE_SERIAL_NUMBER, "none");
     set.text(tags::SOFTWARE_VERSIONS, env!("CARGO_PKG_VERSION"));
-}
-
-/// The description of segment `number` for its item in the Segment Sequence.
-fn put_segment(segment: &mut DataSet, number: u16, kind: Code, label: &str, tracking: &str) {
-    segment.short(tags::SEGMENT_NUMBER, number);
-    segment.text(tags::SEGMENT_LABEL, label);
-    segment.text(tags::SEGMENT_ALGORITHM_TYPE, "AUTOMATIC");
-    segment.code(
-        tags::SEGMENTED_PROPERTY_CATEGORY_CODE_SEQUENCE,
-        ANATOMICAL_STRUCTURE,
-    );
-    segment.code(tags::SEGMENTED_PROPERTY_TYPE_CODE_SEQUENCE, kind);
-    segment.text(tags::TRACKING_ID, label);
-    segment.text(tags::TRACKING_UID, tracking);
 }
 
 /// An item of the Algorithm Identification Macro.

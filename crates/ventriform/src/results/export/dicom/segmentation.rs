@@ -7,14 +7,18 @@
 //! Each names the image or frame that its slice was read from, pixel for pixel (Spatial Locations Preserved), so that
 //! readers find it by that.
 
-use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
+use super::codes::{ANATOMICAL_STRUCTURE, LV_CAVITY, SEGMENTATION_STEP};
 use super::source::for_processing;
-use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm, put_segment};
+use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm};
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::image::grid::voxelise::Mask;
+use ventriform_dicom::tags;
 use ventriform_dicom::write::data_set::DataSet;
-use ventriform_dicom::{Tag, tags};
+use ventriform_dicom::write::image::{PixelFormat, packed_bits};
+use ventriform_dicom::write::segmentation::{
+    SegmentDescription, frame_groups, put_dimensions, shared_groups,
+};
 
 /// Rows, columns and positions of the slices of a volume as DICOM describes them.
 pub(super) struct SlicePlanes {
@@ -66,14 +70,14 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     results.put_content(set);
     results.put_referenced_series(set);
     set.text(tags::IMAGE_TYPE, "DERIVED\\PRIMARY");
-    set.short(tags::SAMPLES_PER_PIXEL, 1);
-    set.text(tags::PHOTOMETRIC_INTERPRETATION, "MONOCHROME2");
-    set.short(tags::ROWS, rows);
-    set.short(tags::COLUMNS, columns);
-    set.short(tags::BITS_ALLOCATED, 1);
-    set.short(tags::BITS_STORED, 1);
-    set.short(tags::HIGH_BIT, 0);
-    set.short(tags::PIXEL_REPRESENTATION, 0);
+    let format = PixelFormat {
+        rows,
+        columns,
+        samples: 1,
+        photometric: "MONOCHROME2",
+        bits: 1,
+    };
+    format.put(set);
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
     set.text(tags::SEGMENTATION_TYPE, "BINARY");
     let mut segment = DataSet::new();
@@ -87,23 +91,36 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     if results.cavity.is_some() {
         let mut segment = DataSet::new();
         let tracking = results.uids.uid("tracking of the cavity");
-        put_segment(&mut segment, 2, LV_CAVITY, LV_CAVITY.meaning, &tracking);
+        let description = SegmentDescription {
+            number: 2,
+            label: LV_CAVITY.meaning,
+            category: ANATOMICAL_STRUCTURE,
+            kind: LV_CAVITY,
+            tracking_uid: &tracking,
+        };
+        description.put(&mut segment);
         put_look(&mut segment, CAVITY_CIELAB);
         segments.push(segment);
         set.text(tags::SEGMENTS_OVERLAP, "NO");
     }
     set.items(tags::SEGMENT_SEQUENCE, segments);
 
-    put_dimensions(results, set);
+    put_dimensions(&results.uids.uid("dimensions"), set);
     set.text(tags::NUMBER_OF_FRAMES, (masks.len() * slices).to_string());
-    set.item(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, shared(&planes));
+    let [x, y] = planes.directions;
+    let cosines = [x.x, x.y, x.z, y.x, y.y, y.z];
+    let shared = shared_groups(planes.spacing, planes.distance, cosines);
+    set.item(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, shared);
     let numbers = 1..=masks.len() as u16;
     let frames = numbers.flat_map(|number| {
         let frames = planes.order.iter().enumerate();
-        frames.map(move |(place, &k)| frame_groups(results, number, place, k))
+        frames.map(move |(place, &k)| frame(results, number, place, k))
     });
     set.items(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, frames.collect());
-    set.bytes(tags::PIXEL_DATA, bits(&masks, &planes.order));
+    set.bytes(
+        tags::PIXEL_DATA,
+        packed_bits(&pixels(&masks, &planes.order)),
+    );
     Ok(())
 }
 
@@ -117,71 +134,11 @@ fn put_look(segment: &mut DataSet, colour: [u16; 3]) {
     segment.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &colour);
 }
 
-/// The Multi-frame Dimension module: the segment, then the position of the slice.
-fn put_dimensions(results: &DicomResults<'_>, set: &mut DataSet) {
-    let organization = results.uids.uid("dimensions");
-    let mut item = DataSet::new();
-    item.text(tags::DIMENSION_ORGANIZATION_UID, organization.as_str());
-    set.item(tags::DIMENSION_ORGANIZATION_SEQUENCE, item);
-    let index = |pointer: Tag, group: Tag, label: &str| {
-        let mut item = DataSet::new();
-        item.tag(tags::DIMENSION_INDEX_POINTER, pointer);
-        item.tag(tags::FUNCTIONAL_GROUP_POINTER, group);
-        item.text(tags::DIMENSION_ORGANIZATION_UID, organization.as_str());
-        item.text(tags::DIMENSION_DESCRIPTION_LABEL, label);
-        item
-    };
-    let segment = index(
-        tags::REFERENCED_SEGMENT_NUMBER,
-        tags::SEGMENT_IDENTIFICATION_SEQUENCE,
-        "Segment Number",
-    );
-    let position = index(
-        tags::IMAGE_POSITION_PATIENT,
-        tags::PLANE_POSITION_SEQUENCE,
-        "Image Position",
-    );
-    set.items(tags::DIMENSION_INDEX_SEQUENCE, vec![segment, position]);
-}
-
-/// Attributes that all frames share.
-fn shared(planes: &SlicePlanes) -> DataSet {
-    let mut measures = DataSet::new();
-    measures.decimals(tags::PIXEL_SPACING, &planes.spacing);
-    measures.decimals(tags::SLICE_THICKNESS, &[planes.distance]);
-    measures.decimals(tags::SPACING_BETWEEN_SLICES, &[planes.distance]);
-    let mut orientation = DataSet::new();
-    let cosines = planes.directions.iter().flat_map(|d| [d.x, d.y, d.z]);
-    let cosines: Vec<f64> = cosines.collect();
-    orientation.decimals(tags::IMAGE_ORIENTATION_PATIENT, &cosines);
-    let mut group = DataSet::new();
-    group.item(tags::PIXEL_MEASURES_SEQUENCE, measures);
-    group.item(tags::PLANE_ORIENTATION_SEQUENCE, orientation);
-    group
-}
-
 /// The functional groups of a segment's frame at `place`, which shows slice `k`.
-fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize) -> DataSet {
-    let mut group = DataSet::new();
-    let mut content = DataSet::new();
-    content.longs(
-        tags::DIMENSION_INDEX_VALUES,
-        vec![u32::from(number), place as u32 + 1],
-    );
-    group.item(tags::FRAME_CONTENT_SEQUENCE, content);
-    let mut position = DataSet::new();
-    let corner = results
-        .scan
-        .frame
-        .to_patient(&Vec3::new(0.0, 0.0, k as f64));
-    position.decimals(
-        tags::IMAGE_POSITION_PATIENT,
-        &[corner.x, corner.y, corner.z],
-    );
-    group.item(tags::PLANE_POSITION_SEQUENCE, position);
-    let mut segment = DataSet::new();
-    segment.short(tags::REFERENCED_SEGMENT_NUMBER, number);
-    group.item(tags::SEGMENT_IDENTIFICATION_SEQUENCE, segment);
+fn frame(results: &DicomResults<'_>, number: u16, place: usize, k: usize) -> DataSet {
+    let first = Vec3::new(0.0, 0.0, k as f64);
+    let corner = results.scan.frame.to_patient(&first);
+    let mut group = frame_groups(number, place as u32 + 1, [corner.x, corner.y, corner.z]);
     if let Some(source) = results.scan.slice_reference(k) {
         let mut derivation = DataSet::new();
         let mut source = for_processing(source);
@@ -196,19 +153,13 @@ fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize)
     group
 }
 
-/// The slices of each mask in `order`, eight voxels to a byte, the first in the lowest bit; frames
-/// follow each other without padding (PS3.5 8.1.1).
-fn bits(masks: &[&Mask], order: &[usize]) -> Vec<u8> {
+/// The voxels of the slices of each mask in `order`.
+fn pixels(masks: &[&Mask], order: &[usize]) -> Vec<bool> {
     let slices = masks.iter().flat_map(|mask| {
         let size = mask.shape[0] * mask.shape[1];
         order
             .iter()
             .map(move |k| &mask.voxels[k * size..(k + 1) * size])
     });
-    let voxels: Vec<bool> = slices.flatten().copied().collect();
-    let byte = |eight: &[bool]| {
-        let bits = eight.iter().enumerate();
-        bits.fold(0, |byte, (bit, set)| byte | u8::from(*set) << bit)
-    };
-    voxels.chunks(8).map(byte).collect()
+    slices.flatten().copied().collect()
 }

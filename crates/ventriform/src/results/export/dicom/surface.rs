@@ -3,6 +3,7 @@
 use super::{DicomError, DicomResults, STRUCTURE_CIELAB, algorithm};
 use crate::results::export::single;
 use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::surface::Surface;
 use ventriform_dicom::{PrimitiveValue, VR, tags};
 
 /// Puts everything that is particular to this object.
@@ -30,55 +31,20 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     set.item(tags::SEGMENT_SEQUENCE, segment);
 
     set.put(tags::NUMBER_OF_SURFACES, VR::UL, count);
-    set.item(tags::SURFACE_SEQUENCE, mesh(results)?);
+    set.item(tags::SURFACE_SEQUENCE, item(results)?);
     Ok(())
 }
 
 /// The item of the Surface Sequence: points, normals and triangles.
-fn mesh(results: &DicomResults<'_>) -> Result<DataSet, DicomError> {
+fn item(results: &DicomResults<'_>) -> Result<DataSet, DicomError> {
     let mesh = results.mesh;
-    let points = single::positions(&mesh.vertices)?;
-    let count = PrimitiveValue::from(points.len() as u32);
-    let mut surface = DataSet::new();
-    surface.put(tags::SURFACE_NUMBER, VR::UL, PrimitiveValue::from(1u32));
-    surface.text(tags::SURFACE_COMMENTS, results.structure.label);
-    surface.text(tags::SURFACE_PROCESSING, "NO");
-    surface.short(tags::RECOMMENDED_DISPLAY_GRAYSCALE_VALUE, 0xffff);
-    surface.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &STRUCTURE_CIELAB);
-    surface.floats(tags::RECOMMENDED_PRESENTATION_OPACITY, vec![1.0]);
-    surface.text(tags::RECOMMENDED_PRESENTATION_TYPE, "SURFACE");
-    surface.text(tags::FINITE_VOLUME, "YES");
-    surface.text(tags::MANIFOLD, "YES");
-
-    let mut coordinates = DataSet::new();
-    coordinates.put(tags::NUMBER_OF_SURFACE_POINTS, VR::UL, count.clone());
-    let numbers: Vec<f32> = points.iter().flatten().copied().collect();
-    coordinates.floats(tags::POINT_COORDINATES_DATA, numbers);
-    surface.item(tags::SURFACE_POINTS_SEQUENCE, coordinates);
-
-    let mut normals = DataSet::new();
-    normals.put(tags::NUMBER_OF_VECTORS, VR::UL, count);
-    normals.short(tags::VECTOR_DIMENSIONALITY, 3);
-    let vectors = mesh.vertex_normals();
-    let numbers = vectors.iter().flat_map(|n| [n.x, n.y, n.z]);
-    let numbers: Vec<f32> = numbers.map(|x| x as f32).collect();
-    normals.floats(tags::VECTOR_COORDINATE_DATA, numbers);
-    surface.item(tags::SURFACE_POINTS_NORMALS_SEQUENCE, normals);
-
-    let mut primitives = DataSet::new();
-    // Points are counted from 1.
-    let corners = mesh.triangles.iter().flatten().map(|v| v + 1);
-    primitives.longs(tags::LONG_TRIANGLE_POINT_INDEX_LIST, corners.collect());
-    primitives.empty(tags::LONG_EDGE_POINT_INDEX_LIST);
-    primitives.empty(tags::LONG_VERTEX_POINT_INDEX_LIST);
-    for none in [
-        tags::TRIANGLE_STRIP_SEQUENCE,
-        tags::TRIANGLE_FAN_SEQUENCE,
-        tags::LINE_SEQUENCE,
-        tags::FACET_SEQUENCE,
-    ] {
-        primitives.items(none, Vec::new());
-    }
-    surface.item(tags::SURFACE_MESH_PRIMITIVES_SEQUENCE, primitives);
-    Ok(surface)
+    let normals = mesh.vertex_normals().into_iter();
+    let surface = Surface {
+        comments: results.structure.label,
+        colour: STRUCTURE_CIELAB,
+        points: single::positions(&mesh.vertices)?,
+        normals: normals.map(|n| [n.x, n.y, n.z].map(|x| x as f32)).collect(),
+        triangles: &mesh.triangles,
+    };
+    Ok(surface.item())
 }

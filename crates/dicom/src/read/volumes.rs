@@ -21,8 +21,7 @@
 //!    Numbers that run through the volumes at each position say nothing of which belong together, because
 //!    every order of writing the files gives such numbers.
 
-use std::cmp::Ordering;
-use ventriform_dicom::read::attributes::{
+use super::attributes::{
     ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_NUMBER, ACQUISITION_TIME, Attribute,
     Attributes, B_VALUE, CARDIAC_PHASE, CONTENT_DATE, CONTENT_TIME, CONVOLUTION_KERNEL,
     ECHO_NUMBERS, ECHO_TIME, FLIP_ANGLE, FRAME_ACQUISITION_NUMBER, FRAME_ACTUAL_DELAY,
@@ -35,6 +34,7 @@ use ventriform_dicom::read::attributes::{
     OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, TEMPORAL_POSITION, TIME_SLOT_VECTOR, TRIGGER_DELAY,
     TRIGGER_TIME,
 };
+use std::cmp::Ordering;
 
 /// Most numbers of Dimension Index Values that are compared.
 const MOST_DIMENSIONS: usize = 16;
@@ -171,7 +171,7 @@ impl Value {
 
 /// A value by one criterion.
 #[derive(Debug, Clone)]
-pub(super) struct Mark {
+pub struct Mark {
     key: Key,
     value: Value,
 }
@@ -198,10 +198,9 @@ impl Key {
     }
 }
 
-#[cfg(test)]
 impl Mark {
-    /// A Trigger Time.
-    pub(super) fn time(value: f64) -> Self {
+    /// A Trigger Time, ms.
+    pub fn trigger_time(value: f64) -> Self {
         let key = Key {
             of_frames: false,
             criterion: 1,
@@ -216,9 +215,8 @@ impl Mark {
 
 /// The statements of one frame.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Marks(Vec<Mark>);
+pub struct Marks(Vec<Mark>);
 
-#[cfg(test)]
 impl<const N: usize> From<[Mark; N]> for Marks {
     fn from(marks: [Mark; N]) -> Self {
         Self(marks.into())
@@ -227,12 +225,12 @@ impl<const N: usize> From<[Mark; N]> for Marks {
 
 impl Marks {
     /// The marks of the file with attributes `a`.
-    pub(super) fn of_file(a: &Attributes) -> Self {
+    pub fn of_file(a: &Attributes) -> Self {
         Self::new(a, None, OF_FILES)
     }
 
     /// The marks of stored frame number `frame`, from 0. What holds for all frames is none.
-    pub(super) fn of_frame(a: &Attributes, frame: usize) -> Self {
+    pub fn of_frame(a: &Attributes, frame: usize) -> Self {
         Self::new(a, Some(frame), OF_FRAMES)
     }
 
@@ -322,7 +320,7 @@ type Parts = Vec<Vec<Vec<usize>>>;
 ///
 /// # Errors
 /// Which frames nothing tells apart, or which attributes contradict each other.
-pub(super) fn deal(
+pub fn deal(
     groups: &[Vec<usize>],
     marks: &[&Marks],
     name: &dyn Fn(usize) -> String,
