@@ -15,7 +15,8 @@ const VOXELS_AT: usize = 352;
 /// The text in the header.
 const DESCRIPTION: &[u8] = b"simulated";
 
-/// How the voxels of an image lie in the patient: the columns of its directions, RAS mm for a step, and its first voxel.
+/// How the voxels of an image lie in the patient: the columns of its directions, RAS mm for a step, and its first
+/// voxel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageFrame {
     /// What a step along each axis adds.

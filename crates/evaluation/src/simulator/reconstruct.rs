@@ -1,11 +1,11 @@
 //! From counts to an image: OSEM or filtered back projection, slice by slice, and a filter.
 //!
-//! In: projections (views x bins across x slices). Out: an image on voxels as large as the bins. Slices are reconstructed
-//! in packs of [`LANES`], each for itself, so that the result does not depend on the number of threads.
+//! In: projections (views x bins across x slices). Out: an image on voxels as large as the bins. Slices are
+//! reconstructed in packs of [`LANES`], each for itself, so that the result does not depend on the number of threads.
 //!
 //! OSEM without a model of the resolution (Hudson and Larkin 1994); attenuation and scatter are in the model if they
-//! are given. The filter multiplies the image's spectrum; before FBP it multiplies that of the projections, with the ramp
-//! of Kak and Slaney, whose mean is right.
+//! are given. The filter multiplies the image's spectrum; before FBP it multiplies that of the projections, with the
+//! ramp of Kak and Slaney, whose mean is right.
 
 use super::camera::View;
 use super::grid::Grid;
