@@ -5,8 +5,8 @@
 //! `params.json`. Gates have few counts and are filtered more strongly.
 
 use super::anatomy::{Place, Vec3};
-use super::case::{merge, place_of, table};
-use super::files::{ImageFrame, Stored, write_json, write_nifti};
+use super::case::{place_of, table};
+use super::files::{ImageFrame, Stored, merge, write_json, write_nifti};
 use super::grid::Grid;
 use super::parameters::{Filter, Parameters};
 use super::scan::{Scene, slices_about};
