@@ -28,6 +28,7 @@ pub mod case;
 pub mod curve;
 pub mod cut;
 pub mod draw;
+pub mod fft;
 pub mod files;
 pub mod gated;
 pub mod grid;
