@@ -110,7 +110,9 @@ library_alone() {
 
 # Every program of tests, as FOLDER<tab>PROGRAM, with the folder in which cargo would start it.
 test_programs() {
-  cargo test --no-run --message-format=json-render-diagnostics |
+  # By targets: the programs of developers have no tests in them, and are many to link.
+  cargo test --workspace --exclude ventriform-python --lib --bin ventriform --test '*' --no-run \
+    --message-format=json-render-diagnostics |
     sed -nE 's/.*"manifest_path":"([^"]*)\/Cargo.toml".*"profile":\{[^}]*"test":true\}.*"executable":"([^"]+)".*/\1\t\2/p'
 }
 # Runs the programs named on standard input one after another.

@@ -37,8 +37,8 @@ TABLE = ROOT / "scripts/measure/calibration/features.csv"
 USUAL_CAVITY_ML = 55.0
 
 REPRODUCED = """\
-The committed table is of an older simulator with the same kinds of scans (the simulator's figures beside it:
-docs/log/simulator.md). It has its cohort, 316 scans of its seeds 2101, 701, 911, 2103 and 411 (42 scans each of
+The committed table is of an older simulator with the same kinds of scans (docs/log/evaluation.md,
+"The simulator"). It has its cohort, 316 scans of its seeds 2101, 701, 911, 2103 and 411 (42 scans each of
 all kinds), 1101 with 28, 2104 with 14, 702 with 18 (motion,rv,infarct), 1102 with 18 (motion), 703 with 14 (rv), 704
 with 14 (motion,apex), the first 111 of seed 5001 (all kinds), and 1000 of seed 9301 (all kinds; the simulator's draw()
 with a matrix of 64 and a spacing of 6.0, 6.4 or 6.8 mm). The constants of GOOD_SET_* are estimated from all of it:

@@ -2,7 +2,8 @@
 """Remakes every table and every constant that is estimated from simulated hearts.
 
     calibrate_all.py CASES                     all of it: some 2,000 scans, a day on two cores
-    calibrate_all.py CASES --share 0.02        the same with a fiftieth of the cases, to see that it works
+    calibrate_all.py CASES --share 0.02        the same with a fiftieth of the cases, to see that it works (in a copy of
+                                               the tree: nothing can be estimated from so few)
     calibrate_all.py CASES --only volumes      one table, and the constants that come from it
 
 CASES is a folder for the simulated scans, 25 GB of them; those that are there are kept. In: seeds and kinds, which
@@ -14,8 +15,8 @@ stand below. Out: the tables in scripts/measure/calibration, and by them
 - heart/comparison/calibration.rs (calibrate_comparison.py)
 
 of crates/ventriform/src. The same commit gives the same bytes on every machine of one kind. The fits are by the
-constants as they stand: run it again until nothing changes, and judge the fits anew (docs/evaluation.md) before anything
-is committed.
+constants as they stand: run it again until nothing changes, and judge the fits anew (docs/evaluation.md) before
+anything is committed.
 """
 
 import argparse
@@ -36,9 +37,6 @@ PROGRAMS = [
     "beats",
     "comparisons",
 ]
-# Fewest cases of a set, so that every estimate of a trial has what it needs.
-FEWEST = 4
-
 ALL = "in,motion,rv,basal,apex,infarct,large,small,noise,gut,liver,coarse,turned,none"
 # Kinds with a heart in its place, for the ends of the signal.
 SEEN = "in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct"
@@ -86,7 +84,7 @@ class Lab:
             into.write_bytes(made.stdout)
 
     def number(self, whole):
-        return min(whole, max(FEWEST, math.ceil(self.share * whole)))
+        return math.ceil(self.share * whole)
 
     def scans(self, names):
         """The folders of the sets, made if they are not there."""
@@ -94,9 +92,9 @@ class Lab:
         for name in names:
             seed, whole, kinds, coarse = SETS[name]
             number, kinds = self.number(whole), kinds.split(",")
-            # A few cases still have kinds from all over the list.
-            if number < len(kinds) and self.share < 1:
-                kinds = [kinds[k * len(kinds) // number] for k in range(number)]
+            # A few cases of many sets still have kinds from all over the list.
+            if number < len(kinds):
+                kinds = [kinds[(seed + k * len(kinds) // number) % len(kinds)] for k in range(number)]
             more = ["--coarse"] if coarse else []
             out = self.cases / name
             self.run(

@@ -50,8 +50,8 @@ NODES = ROOT / "crates/ventriform/src/heart/judge/uncertainty_calibration.rs"
 TABLES = ROOT / "scripts/measure/calibration"
 
 REPRODUCED = """\
-The committed tables are of an older simulator with the same kinds of scans (the simulator's figures beside it:
-docs/log/simulator.md): its cohort and the scans with a heart, not refused, of seeds 411 and 701 with
+The committed tables are of an older simulator with the same kinds of scans (docs/log/evaluation.md,
+"The simulator"): its cohort and the scans with a heart, not refused, of seeds 411 and 701 with
 42 scans of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and
 2104 with 14 of all kinds. signal_ends.csv has the cohort, the first scans of seeds 9001 and 9101
 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct) and 94 of seed 9111

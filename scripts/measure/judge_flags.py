@@ -1,16 +1,16 @@
 """Flags judged on simulated hearts: dark apices, images that were cut and resliced, and files whose sides are
 exchanged.
 
-    python scripts/measure/judge_flags.py OUT --apices SEED                makes hearts whose apex is dark in whole or in
-                                                                           part, and healthy ones
+    python scripts/measure/judge_flags.py OUT --apices SEED                makes hearts whose apex is dark, in whole or
+                                                                           in part, and healthy ones
     python scripts/measure/judge_flags.py OUT --cuts SEED --cases CASE...  cuts images of cases at four sides, and
                                                                            reslices them obliquely
     python scripts/measure/judge_flags.py OUT --mirrored --cases CASE...   exchanges left and right of cases
     python scripts/measure/judge_flags.py OUT --judge [--programs target/release]
 
---apices takes the program `simulate`. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the truth
-beside it, the error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in OUT; what
-is there already is kept.
+--apices takes the program `simulate`. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the
+truth beside it, the error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in
+OUT; what is there already is kept.
 """
 
 import argparse

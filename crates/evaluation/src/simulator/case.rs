@@ -9,7 +9,7 @@ use super::anatomy::heart::PlacedHeart;
 use super::anatomy::ventricle::Ventricle;
 use super::anatomy::{Place, Vec3};
 use super::cut::Slices;
-use super::files::{ImageFrame, Stored, write_json, write_nifti, write_ply};
+use super::files::{ImageFrame, Stored, merge, write_json, write_nifti, write_ply};
 use super::grid::Grid;
 use super::parameters::{Cut, Parameters};
 use super::reader::{Masks, masks};
@@ -130,13 +130,6 @@ pub fn write(parameters: &Parameters, folder: &Path) -> Result<Value> {
     };
     write_json(&folder.join("params.json"), &stated)?;
     Ok(result)
-}
-
-/// Adds the fields of one object to another.
-pub fn merge(into: &mut Value, more: Value) {
-    if let (Value::Object(into), Value::Object(more)) = (into, more) {
-        into.extend(more);
-    }
 }
 
 /// Where the table lies.

@@ -1,7 +1,7 @@
 //! Draws the parameters of a patient, a camera and a reconstruction.
 //!
-//! In: a [`Profile`] and a seed. Out: [`Parameters`]. What a profile leaves open has the spread of usual patients: walls
-//! of 9.6 mm (deviation 0.8), ejection fractions about 64 %, LEHR collimators, half a turn in 60 or 64 views.
+//! In: a [`Profile`] and a seed. Out: [`Parameters`]. What a profile leaves open has the spread of usual patients:
+//! walls of 9.6 mm (deviation 0.8), ejection fractions about 64 %, LEHR collimators, half a turn in 60 or 64 views.
 
 use super::parameters::{
     Acquisition, Beat, BeatCurve, Body, BodyMotion, Breathing, Collimator, Cut, Defect, Filter,

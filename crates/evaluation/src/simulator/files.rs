@@ -6,6 +6,7 @@ use super::anatomy::Vec3;
 use super::grid::Grid;
 use flate2::{Compression, GzBuilder};
 use serde::Serialize;
+use serde_json::Value;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
@@ -15,7 +16,8 @@ const VOXELS_AT: usize = 352;
 /// The text in the header.
 const DESCRIPTION: &[u8] = b"simulated";
 
-/// How the voxels of an image lie in the patient: the columns of its directions, RAS mm for a step, and its first voxel.
+/// How the voxels of an image lie in the patient: the columns of its directions, RAS mm for a step, and its first
+/// voxel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageFrame {
     /// What a step along each axis adds.
@@ -171,14 +173,21 @@ pub fn write_json(path: &Path, document: &impl Serialize) -> io::Result<()> {
     fs::write(path, bytes)
 }
 
-fn round(value: &mut serde_json::Value) {
+/// Adds the fields of one object to another.
+pub fn merge(into: &mut Value, more: Value) {
+    if let (Value::Object(into), Value::Object(more)) = (into, more) {
+        into.extend(more);
+    }
+}
+
+fn round(value: &mut Value) {
     match value {
-        serde_json::Value::Number(number) if number.is_f64() => {
+        Value::Number(number) if number.is_f64() => {
             let rounded = number.as_f64().map(|x| (x * 1e5).round() / 1e5);
             *value = rounded.into();
         }
-        serde_json::Value::Array(values) => values.iter_mut().for_each(round),
-        serde_json::Value::Object(fields) => fields.values_mut().for_each(round),
+        Value::Array(values) => values.iter_mut().for_each(round),
+        Value::Object(fields) => fields.values_mut().for_each(round),
         _ => {}
     }
 }

@@ -18,9 +18,9 @@
 //! 5. Truth is computed from the anatomy, not from images ([`truth`], [`reader`]).
 //!
 //! Guaranteed: the same seed gives the same bytes on any number of threads; each purpose has its own stream of random
-//! numbers ([`random`]). Not modelled: beats of different length within a gate, a tilting mitral plane, papillary muscles
-//! that move by themselves, gut that moves with the beat, a delay of the right ventricle, motion between gates, scatter
-//! by the place where it happens.
+//! numbers ([`random`]). Not modelled: beats of different length within a gate, a tilting mitral plane, papillary
+//! muscles that move by themselves, gut that moves with the beat, a delay of the right ventricle, motion between gates,
+//! scatter by the place where it happens.
 
 pub mod anatomy;
 pub mod camera;
@@ -28,6 +28,7 @@ pub mod case;
 pub mod curve;
 pub mod cut;
 pub mod draw;
+pub mod fft;
 pub mod files;
 pub mod gated;
 pub mod grid;

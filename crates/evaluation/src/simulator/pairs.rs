@@ -2,8 +2,8 @@
 //!
 //! The anatomy is the same. There is new noise, the heart lies a few millimetres and degrees elsewhere, liver and gut
 //! take up more or less, stress has more counts, and values have another scale. Files: `stress` and `rest`, each as
-//! [`study`] writes it, and `pair.json`: whether the scans can be compared, transient dilation, ejection fractions, what
-//! is reversible (shares of the wall, segments) and what fixed.
+//! [`study`] writes it, and `pair.json`: whether the scans can be compared, transient dilation, ejection fractions,
+//! what is reversible (shares of the wall, segments) and what fixed.
 
 use super::anatomy::material::Map;
 use super::anatomy::ventricle::Ventricle;

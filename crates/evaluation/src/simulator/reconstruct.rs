@@ -1,18 +1,17 @@
 //! From counts to an image: OSEM or filtered back projection, slice by slice, and a filter.
 //!
-//! In: projections (views x bins across x slices). Out: an image on voxels as large as the bins. Slices are reconstructed
-//! in packs of [`LANES`], each for itself, so that the result does not depend on the number of threads.
+//! In: projections (views x bins across x slices). Out: an image on voxels as large as the bins. Slices are
+//! reconstructed in packs of [`LANES`], each for itself, so that the result does not depend on the number of threads.
 //!
 //! OSEM without a model of the resolution (Hudson and Larkin 1994); attenuation and scatter are in the model if they
-//! are given. The filter multiplies the image's spectrum; before FBP it multiplies that of the projections, with the ramp
-//! of Kak and Slaney, whose mean is right.
+//! are given. The filter multiplies the image's spectrum; before FBP it multiplies that of the projections, with the
+//! ramp of Kak and Slaney, whose mean is right.
 
 use super::camera::View;
+use super::fft::{Fft, Wave};
 use super::grid::Grid;
 use super::parameters::{Filter, Method, Reconstruction};
 use rayon::prelude::*;
-use rustfft::num_complex::Complex32;
-use rustfft::{FftDirection, FftPlanner};
 use std::f64::consts::PI;
 
 /// Slices that are reconstructed at once.
@@ -334,7 +333,7 @@ fn fbp(projections: &Grid, views: &[View], voxel_mm: f64, filter: &Filter) -> Gr
             for u in 0..across {
                 let row = projections.column(view, u);
                 for (z, value) in row.iter().enumerate() {
-                    plane.values[u * along + z] = Complex32::new(*value, 0.0);
+                    plane.values[u * along + z] = Wave::new(*value, 0.0);
                 }
             }
             plane.filter(|[_, u, z]| gain(u, z));
@@ -377,21 +376,17 @@ fn ramp(count: usize) -> Vec<f32> {
             _ => 0.0,
         }
     };
-    let mut line: Vec<Complex32> = (0..count)
-        .map(|n| Complex32::new(value(n) as f32, 0.0))
+    let mut line: Vec<Wave> = (0..count)
+        .map(|n| Wave::new(value(n) as f32, 0.0))
         .collect();
-    FftPlanner::new().plan_fft_forward(count).process(&mut line);
+    Fft::new(count).process(&mut line, false);
     line.iter().map(|v| v.re).collect()
 }
 
 /// The image with the filter's share of each frequency.
 pub fn filtered(image: &Grid, voxel_mm: f64, filter: &Filter) -> Grid {
     let shape = image.shape;
-    let values = image
-        .values
-        .iter()
-        .map(|v| Complex32::new(*v, 0.0))
-        .collect();
+    let values = image.values.iter().map(|v| Wave::new(*v, 0.0)).collect();
     let mut spectrum = Spectrum { shape, values };
     spectrum.filter(|at| {
         let f = [0, 1, 2].map(|i| frequency(at[i], shape[i], voxel_mm));
@@ -409,50 +404,50 @@ fn frequency(at: usize, count: usize, voxel_mm: f64) -> f64 {
     turns as f64 / count as f64 / (voxel_mm / 10.0)
 }
 
-/// Complex numbers on a grid, z fastest.
+/// Complex numbers on a grid, z fastest. Each axis has a power of two of them.
 struct Spectrum {
     shape: [usize; 3],
-    values: Vec<Complex32>,
+    values: Vec<Wave>,
 }
 
 impl Spectrum {
     fn zeros(shape: [usize; 3]) -> Self {
         Self {
             shape,
-            values: vec![Complex32::default(); shape.iter().product()],
+            values: vec![Wave::default(); shape.iter().product()],
         }
     }
 
     /// Multiplies the spectrum by a gain.
     fn filter(&mut self, gain: impl Fn([usize; 3]) -> f32) {
-        self.transform(FftDirection::Forward);
+        self.transform(false);
         let [_, ny, nz] = self.shape;
         let scale = 1.0 / self.values.len() as f32;
         for (at, value) in self.values.iter_mut().enumerate() {
             *value *= scale * gain([at / (ny * nz), at / nz % ny, at % nz]);
         }
-        self.transform(FftDirection::Inverse);
+        self.transform(true);
     }
 
-    fn transform(&mut self, direction: FftDirection) {
+    fn transform(&mut self, inverse: bool) {
         for axis in [2, 1, 0] {
             let count = self.shape[axis];
             if count == 1 {
                 continue;
             }
-            let fft = FftPlanner::new().plan_fft(count, direction);
+            let fft = Fft::new(count);
             if axis == 2 {
-                fft.process(&mut self.values);
+                fft.process(&mut self.values, inverse);
                 continue;
             }
             // Planes of rows become columns: the axis is made the fastest, and put back.
             let inner: usize = self.shape[axis + 1..].iter().product();
-            let mut lines = vec![Complex32::default(); count * inner];
+            let mut lines = vec![Wave::default(); count * inner];
             for block in self.values.chunks_exact_mut(count * inner) {
                 for (at, value) in block.iter().enumerate() {
                     lines[at % inner * count + at / inner] = *value;
                 }
-                fft.process(&mut lines);
+                fft.process(&mut lines, inverse);
                 for (at, value) in block.iter_mut().enumerate() {
                     *value = lines[at % inner * count + at / inner];
                 }

@@ -1,12 +1,12 @@
 //! A gated study: the same heart in gates of its beat, each reconstructed by itself.
 //!
 //! Files: `gated.nii.gz` (x, y, z, gate), if there are gates; `spect.nii.gz`, all counts by the filter for perfusion;
-//! `wall_truth.nii.gz` and `cavity_truth.nii.gz`, the share of each voxel (a file for all gates), on request; `params.json`.
-//! Gates have few counts and are filtered more strongly.
+//! `wall_truth.nii.gz` and `cavity_truth.nii.gz`, the share of each voxel (a file for all gates), on request;
+//! `params.json`. Gates have few counts and are filtered more strongly.
 
 use super::anatomy::{Place, Vec3};
-use super::case::{merge, place_of, table};
-use super::files::{ImageFrame, Stored, write_json, write_nifti};
+use super::case::{place_of, table};
+use super::files::{ImageFrame, Stored, merge, write_json, write_nifti};
 use super::grid::Grid;
 use super::parameters::{Filter, Parameters};
 use super::scan::{Scene, slices_about};

@@ -8,8 +8,8 @@
 use super::anatomy::Vec3;
 use super::anatomy::material::{self, Map, RINGS, SPOKES, metric};
 use super::anatomy::ventricle::{Phase, Ventricle};
-use super::case::merge;
 use super::curve::PeriodicCurve;
+use super::files::merge;
 use serde_json::{Map as Object, Value, json};
 use std::f64::consts::TAU;
 use std::ops::Range;
