@@ -63,9 +63,7 @@ pub async fn list_audit_events(
         since: search.since,
         until: search.until,
     };
-    // What was noted within the last second belongs to the answer.
-    app.service.recorder.flush().await;
-    let page = app.service.access.audit(&filter, page).await?;
+    let page = app.service.audit_trail(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let events = page.items.iter().map(fhir).collect();
     Ok(Json(AuditPage {

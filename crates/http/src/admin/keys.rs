@@ -19,12 +19,10 @@ use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::fmt::Display;
 use utoipa::{IntoParams, ToSchema};
 use ventriform_service::base::records::{Timestamp, parse_rfc3339};
-use ventriform_service::callers::{
-    Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
-};
+use ventriform_service::callers::{ApiKey, Maker, Quota, Scope};
+use ventriform_service::use_cases::keys::KeyOrder;
 
 /// A key. Its secret is shown once, when it is made.
 #[derive(Serialize, ToSchema)]
@@ -146,17 +144,15 @@ pub async fn create_key(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let now = app.service.now();
-    let ends = Ends::from_caller(&app, &caller, now);
-    let wanted = read(&json_object(&app, request).await?, &caller, ends)?;
-    let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
-    let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
-    app.service.access.add_key(&key, &event).await?;
+    let order = read(&json_object(&app, request).await?)?;
+    let service = &app.service;
+    let made = service.create_key(&caller.by, &caller.identity, order);
+    let (key, text) = made.await?;
     app.guard.gate.refresh();
     let location = public_path(&format!("/v1/keys/{}", key.id));
     let body = KeyBody {
         key: Some(text),
-        ..KeyBody::from_key(key, now)
+        ..KeyBody::from_key(key, service.now())
     };
     let headers = [
         (header::LOCATION, location),
@@ -184,7 +180,7 @@ pub async fn list_keys(
 ) -> Answer<Json<KeyList>> {
     let page = page.charged().await?;
     let now = app.service.now();
-    let page = app.service.access.keys(Some(&caller.tenant), page).await?;
+    let page = app.service.keys(&caller.tenant, page).await?;
     let next_cursor = next_cursor(&page);
     let keys = page
         .items
@@ -208,8 +204,8 @@ pub async fn revoke_key(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer {
-    let key = app.service.access.key(&id).await?;
-    if key.is_none_or(|key| key.tenant != caller.tenant) {
+    let revoked = app.service.revoke_key(&caller.by, &caller.tenant, &id);
+    if !revoked.await? {
         return Err(Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
@@ -217,34 +213,8 @@ pub async fn revoke_key(
         )
         .fix("Take an id from the list at GET /v1/keys."));
     }
-    let now = app.service.now();
-    let event = caller.by.event(Activity::KeyRevoked, now).on(&id);
-    app.service.access.revoke_key(&id, now, &event).await?;
     app.guard.gate.refresh();
     Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())
-}
-
-/// When a key ends that a caller makes.
-#[derive(Clone, Copy)]
-struct Ends {
-    /// If it does not ask.
-    unasked: Option<Timestamp>,
-    /// At the latest.
-    last: Option<Timestamp>,
-}
-
-impl Ends {
-    fn from_caller(app: &App, caller: &Caller, now: Timestamp) -> Self {
-        let (_, unasked) = caller.own;
-        let is_token = caller.key.is_none() && caller.owner.is_some();
-        let life = app.service.settings.oidc_key_life.0;
-        let life = Timestamp::try_from(life.as_millis()).unwrap_or(Timestamp::MAX);
-        let asked = is_token.then(|| now.saturating_add(life));
-        Self {
-            unasked,
-            last: unasked.map(|end| asked.map_or(end, |asked| asked.max(end))),
-        }
-    }
 }
 
 /// Keys to revoke.
@@ -285,17 +255,13 @@ pub async fn revoke_keys_of_owner(
         Problem::invalid_field("owner", "`owner` is missing. Nothing was revoked.")
             .fix("Give the `owner` that GET /v1/keys shows; or DELETE /v1/keys/ID for one key.")
     })?;
-    let now = app.service.now();
-    let event = caller.by.event(Activity::KeyRevoked, now);
-    let access = &app.service.access;
-    let revoked = access
-        .revoke_keys_of(&owner, Some(&caller.tenant), now, &event)
-        .await?;
+    let (service, tenant) = (&app.service, &caller.tenant);
+    let revoked = service.revoke_keys_of(&caller.by, tenant, &owner).await?;
     app.guard.gate.refresh();
     Ok((Extension(AlreadyRecorded), Json(RevokedKeys { revoked })).into_response())
 }
 
-fn read(object: &Map<String, Value>, caller: &Caller, ends: Ends) -> Answer<KeyRequest> {
+fn read(object: &Map<String, Value>) -> Answer<KeyOrder> {
     if let Some(name) = object
         .keys()
         .find(|name| !KEY_FIELDS.contains(&name.as_str()))
@@ -333,62 +299,16 @@ fn read(object: &Map<String, Value>, caller: &Caller, ends: Ends) -> Answer<KeyR
     let expires_at = text("expires_at", time)?
         .map(|text| parse_rfc3339(&text).ok_or_else(|| wrong("expires_at", time)))
         .transpose()?;
-    if !caller.scope.includes(scope) {
-        return Err(beyond("scope", caller.scope));
-    }
-    if scope == Scope::Admin && caller.makers + 1 >= MOST_MAKERS {
-        // It could make one more.
-        return Err(beyond("scope", Scope::Submit));
-    }
-    // What the maker has itself, and what the operator allows everybody.
-    let (own, _) = caller.own;
-    let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
-        let asked = number(field)?;
-        match (asked, allowed) {
-            (Some(asked), Some(allowed)) if asked > allowed => Err(beyond(field, allowed)),
-            (None, _) => Ok(own),
-            (asked, _) => Ok(asked),
-        }
-    };
-    let expires_at = match (expires_at, ends.last) {
-        (Some(asked), Some(last)) if asked > last => {
-            return Err(beyond("expires_at", rfc3339(last)));
-        }
-        (asked, _) => asked.or(ends.unasked),
-    };
-    Ok(KeyRequest {
+    Ok(KeyOrder {
         name: text("name", "Give a text.")?.unwrap_or_default(),
-        tenant: caller.tenant.clone(),
         scope,
-        quota: Quota {
-            requests: bounded("requests_per_minute", own.requests, caller.quota.requests)?,
-            bytes: bounded("stored_bytes", own.bytes, caller.quota.bytes)?,
-            jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
-        },
-        maker: Maker::Caller(caller.key.clone()),
-        owner: caller.owner.clone(),
         expires_at,
+        quota: Quota {
+            requests: number("requests_per_minute")?,
+            bytes: number("stored_bytes")?,
+            jobs: number("queued_jobs")?,
+        },
     })
-}
-
-/// 422: a key gets no more than the one that makes it has, and than the operator allows.
-fn beyond(field: &str, allowed: impl Display) -> Problem {
-    Problem::invalid_field(
-        field,
-        format!("`{field}` is more than this caller may give: at most {allowed}."),
-    )
-    .fix("Give less, or leave it out; the operator can make keys with more by `ventriform keys create`.")
-}
-
-fn unusable(error: KeyError) -> Problem {
-    match error {
-        KeyError::Name => {
-            Problem::invalid_field("name", format!("Unusable: {error}.")).fix("Give a short name.")
-        }
-        KeyError::Expired => Problem::invalid_field("expires_at", format!("Unusable: {error}."))
-            .fix("Give a time in the future."),
-        KeyError::NoRandomNumbers => Problem::internal(error),
-    }
 }
 
 impl KeyBody {

@@ -140,12 +140,7 @@ pub async fn list_received(
     Query((page, search)): Query<(PageQuery, ReceivedQuery)>,
 ) -> Answer<Json<ReceivedList>> {
     let (page, state) = (page.charged().await?, search.state.map(|word| word.0));
-    let page = app
-        .service
-        .intake
-        .store
-        .groups(&caller.tenant, state, page)
-        .await?;
+    let page = app.service.received(&caller.tenant, state, page).await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceivedList {
         intake: page.items.into_iter().map(ReceivedBody::from).collect(),

@@ -145,7 +145,7 @@ pub async fn create_comparison(
         return filing::file_upload(&app, &caller, job, query, request).await;
     }
     refuse_query(&app, query)?;
-    let settings = &app.service.settings;
+    let settings = app.service.settings();
     let limits = BodyLimits::of_json(settings, settings.json_limit);
     request.extensions_mut().insert(limits);
     let headers = request.headers().clone();
@@ -245,7 +245,7 @@ async fn scan_of(
     };
     match Resource::from_id(id) {
         Some(Resource::Segmentation | Resource::Beat) => {
-            let product = products::stored(app, tenant, id).await?;
+            let product = app.service.product(tenant, id).await?;
             let fit = product.map(|product| (product.item.volume, product.item.parameters));
             match fit {
                 Some((Some(volume), parameters)) => Ok(NamedScan {

@@ -6,15 +6,15 @@ use crate::edge::caller::Caller;
 use crate::openapi::{self, LookupProblems};
 use crate::resources::collection::find;
 use crate::resources::volumes::{LegalHoldBody, Volumes};
-use crate::wire::problem::{Answer, Problem};
+use crate::wire::problem::Answer;
+use crate::wire::problem::not_found::missing;
 use crate::wire::query::NoQuery;
 use crate::wire::request::{PathSegments, json_object, unknown};
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
-use ventriform::base::text::is_printable;
-use ventriform_service::base::records::LegalHold;
+use ventriform_service::base::records::Resource;
 
 /// Put a volume on legal hold
 ///
@@ -37,13 +37,14 @@ pub async fn hold_volume(
     if let Some(name) = object.keys().find(|name| *name != "reason") {
         return Err(unknown("field", name, &["reason"]));
     }
-    let hold = LegalHold {
-        reason: reason(object.get("reason"))?,
-        since: app.service.now(),
-        by: caller.name.clone(),
-    };
-    set(&app, &caller, &id, Some(hold.clone())).await?;
-    Ok(Json(LegalHoldBody::new(hold, caller.scope)))
+    let (service, tenant) = (&app.service, &caller.tenant);
+    let reason = object.get("reason").and_then(Value::as_str);
+    let reason = reason.unwrap_or_default();
+    let held = service.hold_volume(&caller.by, tenant, &id, &caller.name, reason);
+    match held.await? {
+        Some(hold) => Ok(Json(LegalHoldBody::new(hold, caller.scope))),
+        None => Err(missing(&app, tenant, Resource::Volume, &id).await),
+    }
 }
 
 /// Lift the legal hold of a volume
@@ -61,39 +62,9 @@ pub async fn release_volume(
     _: NoQuery,
 ) -> Answer<StatusCode> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    set(&app, &caller, &id, None).await?;
-    Ok(StatusCode::NO_CONTENT)
-}
-
-async fn set(app: &App, caller: &Caller, id: &str, hold: Option<LegalHold>) -> Answer<()> {
-    let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let volume = id.to_owned();
-    let set = async move {
-        let catalogue = items.catalogue();
-        catalogue
-            .set_legal_hold(&tenant, &volume, hold.as_ref())
-            .await
-    };
-    if caller.by.change(set).await? {
-        Ok(())
-    } else {
-        find::<Volumes>(app, &caller.tenant, id).await.map(|_| ())
-    }
-}
-
-fn reason(value: Option<&Value>) -> Answer<String> {
-    let text = value.and_then(Value::as_str).unwrap_or_default().trim();
-    let control = |c: char| !is_printable(c) && c != '\n';
-    if (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control) {
-        Ok(text.to_owned())
-    } else {
-        Err(Problem::invalid_field(
-            "reason",
-            format!(
-                "`reason` must be a text of 1 to {} printable characters.",
-                LegalHold::REASON_LENGTH
-            ),
-        )
-        .fix("Say why the volume must be kept, such as the number of a case."))
+    let (service, tenant) = (&app.service, &caller.tenant);
+    match service.release_volume(&caller.by, tenant, &id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(missing(&app, tenant, Resource::Volume, &id).await),
     }
 }

@@ -159,7 +159,7 @@ pub async fn create_normals(
     }
     let bytes = json_bytes(request).await?;
     // A table is short; whatever is longer is read as limits, under the budget of decoding.
-    let table_limit = app.service.settings.json_limit.as_usize();
+    let table_limit = app.service.settings().json_limit.as_usize();
     let object = if bytes.len() <= table_limit {
         Some(parsed(&app, bytes.clone(), object_of).await?)
     } else {

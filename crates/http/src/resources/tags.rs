@@ -18,6 +18,7 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
 use ventriform::base::text::is_printable;
+use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{TagFilter, Tags};
 use ventriform_service::callers::Scope;
 
@@ -136,19 +137,13 @@ pub async fn change<'a>(
         let after = merged(app, before.clone(), &patch)?;
         // The tags are a small part of the row.
         end_rows(0).await;
-        let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-        let item = id.to_owned();
-        let change = async move {
-            let changed = items
-                .catalogue()
-                .change_tags(&tenant, &item, &before, &after);
-            changed.await
-        };
-        if caller.by.change(change).await? {
+        let (service, tenant) = (&app.service, &caller.tenant);
+        let changed = service.change_tags(&caller.by, tenant, id, before, after);
+        if changed.await? {
             return Ok(());
         }
     }
-    Err(Problem::contended("these tags"))
+    Err(ServiceError::contended("these tags").into())
 }
 
 /// The tags after a JSON merge patch: what is `null` goes, what is absent stays.
@@ -245,7 +240,7 @@ fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<Stri
 }
 
 fn limit_labels(app: &App, labels: &BTreeMap<String, String>) -> Answer<()> {
-    let limit = app.service.settings.label_limit;
+    let limit = app.service.settings().label_limit;
     if labels.len() <= limit {
         Ok(())
     } else {

@@ -5,9 +5,7 @@ use crate::edge::caller::Caller;
 use crate::edge::quota::reserve_item;
 use crate::openapi::{self, LookupProblems, UploadProblems};
 use crate::resources::collection::find;
-use crate::resources::products::{
-    DownloadBody, Presented, ProductCollection, SoftwareBody, stored,
-};
+use crate::resources::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use crate::wire::links::{added, path_of, rfc3339};
 use crate::wire::problem::{Answer, Problem, ProblemBody};
 use crate::wire::query::{NoQuery, Query};
@@ -17,7 +15,6 @@ use crate::wire::words::{MeshFrameName, MeshUnitName, OrganName};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Request, State};
-use futures::TryStreamExt;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
@@ -224,13 +221,8 @@ pub async fn update_template(
             }
             (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
-        let items = app.service.items().clone();
-        let (tenant, template) = (tenant.clone(), id.clone());
-        let set = async move {
-            let catalogue = items.catalogue();
-            catalogue.set_library(&tenant, &template, library).await
-        };
-        caller.by.change(set).await?;
+        let set = app.service.set_library(&caller.by, tenant, &id, library);
+        set.await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::from_held(&app, template).into()))
@@ -248,40 +240,12 @@ async fn given_mesh(
 ) -> Answer<(Bytes, Option<String>)> {
     match model {
         None => Ok((body, None)),
-        Some(id) if body.is_empty() => stored_mesh(app, tenant, id).await,
+        Some(id) if body.is_empty() => Ok(app.service.stored_mesh(tenant, id).await?),
         Some(_) => Err(Problem::bad_request(
             "contradiction",
             "The request has both a body and `model`.",
         )
         .at("model")
         .fix("Send a mesh or name a model, not both.")),
-    }
-}
-
-/// The JSON mesh of a stored model or segmentation, with the id of its volume.
-async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let product = match Resource::from_id(id) {
-        Some(Resource::Model | Resource::Segmentation) => stored(app, tenant, id).await?,
-        _ => None,
-    };
-    let Some(product) = product else {
-        return Err(app.service.names_nothing(tenant, "model", id).await?.into());
-    };
-    match product.file("mesh.json") {
-        Some(file) if file.bytes <= MESH_SIZE.0 => {
-            let pieces = app
-                .service
-                .items()
-                .blobs()
-                .read(id, &file.record(), 0..file.bytes)
-                .await?;
-            let pieces: Vec<Bytes> = pieces.try_collect().await?;
-            Ok((pieces.concat().into(), product.volume.clone()))
-        }
-        _ => Err(Problem::invalid_field(
-            "model",
-            "The mesh of this model is too large to be fitted.",
-        )
-        .fix("Name a model of at most 5000 points.")),
     }
 }

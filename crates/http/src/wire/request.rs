@@ -130,8 +130,8 @@ pub async fn parsed<T: Send + 'static>(
     }
     let length = bytes.len() as u64;
     charge(PARSED_MEMORY * length).await?;
-    let decoding = &app.service.decoding;
     let parse = move |_: &Monitor<'_>| parse(&bytes);
+    let decoding = app.service.decoding();
     decoding.run_on(length, PARSING_MEMORY, parse).await?
 }
 

@@ -9,6 +9,9 @@ use std::time::Duration;
 /// Pause before a use case is tried again that failed for a reason which may pass.
 const STORAGE_RETRY: Duration = Duration::from_secs(5);
 
+/// Pause before a change is made again that others came before.
+const CONTENDED_RETRY: Duration = Duration::from_secs(1);
+
 /// Longest text of a caller that a message repeats, characters.
 const SHORTENED_LENGTH: usize = 80;
 
@@ -66,6 +69,14 @@ impl ServiceError {
         Failure::new(Fault::Service, "internal", detail)
             .fix("Report it with the x-request-id of this answer.")
             .into()
+    }
+
+    /// Other callers change the same thing all the time, so that it was not changed.
+    pub fn contended(what: &str) -> Self {
+        let detail =
+            format!("Other requests change {what} at the same time, so that was not changed.");
+        let failure = Failure::new(Fault::Service, "busy", detail).fix(RETRY_FIX);
+        Self::new(Refusal::Unavailable, failure).after(CONTENDED_RETRY)
     }
 
     /// Whether trying again later may help.
@@ -192,6 +203,11 @@ fn storage_failure(error: &StoreError) -> Failure {
 }
 
 const RETRY_FIX: &str = "Send the request again after the number of seconds in Retry-After.";
+
+/// A failure of a request whose `field` cannot be used.
+pub fn invalid_field(field: &str, detail: impl Into<String>) -> Failure {
+    Failure::new(Fault::Request, "invalid-field", detail).at(field)
+}
 
 /// A caller's text, cut to 80 characters for use in a message.
 pub fn shorten(text: &str) -> String {

@@ -1,15 +1,63 @@
-//! Erasing what is no item: received objects, work items.
+//! Erasing on request: items, all volumes of somebody, received objects, work items.
 //!
-//! As an item's ([`crate::items`]): the rows go in one transaction that also writes the row of the audit trail and the
+//! As an item's ([`crate::items`]), so of all others: the rows go in one transaction that also writes the row of the audit trail and the
 //! receipt; then the files; then what the database's files still hold of the rows is overwritten. All of it runs in a
 //! task of its own, which goes on if the caller goes away.
 
 use crate::base::error::ServiceError;
-use crate::base::records::{Erased, ErasureReason, Receipt, StoreError, Tenant};
+use crate::base::records::{
+    Erased, ErasureOrder, ErasureReason, Receipt, Resource, ScanErasureOrder, ScanErasurePlan,
+    ScansErased, StoreError, Tenant,
+};
 use crate::callers::Agent;
 use crate::use_cases::service::Service;
 
 impl Service {
+    /// Erases an item of that kind of a tenant; with `cascade`, what was made of it, too.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn erase_item(
+        &self,
+        by: &Agent,
+        tenant: &Tenant,
+        kind: Resource,
+        id: &str,
+        cascade: bool,
+    ) -> Result<Erased, ServiceError> {
+        if Resource::from_id(id) != Some(kind) {
+            return Ok(Erased::Unknown);
+        }
+        let order = ErasureOrder {
+            renewed_before: None,
+            tenant: tenant.clone(),
+            id: id.to_owned(),
+            cascade,
+            by: by.of_erasure(),
+            reason: ErasureReason::Request,
+        };
+        Ok(self.items().erase(order).await?)
+    }
+
+    /// What such an order would erase, and what stands in its way. Changes nothing.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn plan_scan_erasure(
+        &self,
+        order: &ScanErasureOrder,
+    ) -> Result<ScanErasurePlan, ServiceError> {
+        Ok(self.items().plan_scan_erasure(order).await?)
+    }
+
+    /// Erases what an order selects: all, or nothing if something stands in the way.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn erase_scans(&self, order: ScanErasureOrder) -> Result<ScansErased, ServiceError> {
+        Ok(self.items().erase_scans(order).await?)
+    }
+
     /// Erases the objects of a group that are not part of a volume, and what is known of those that are. `None` if the
     /// tenant has no such group.
     ///

@@ -3,16 +3,18 @@
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets
 //! the same limits; here they are refused before the body is read, and read under the budget of decoding.
 
-use crate::base::error::{Refusal, ServiceError};
+use crate::base::error::{Refusal, ServiceError, invalid_field};
 use crate::base::records::{
-    ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, Tenant,
+    ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, StoreError, Tenant,
 };
 use crate::callers::{Agent, Quota};
 use crate::items::{NotAdded, TemplateSource, WorkOutput};
 use crate::limits::decoding::LITTLE_MEMORY;
 use crate::limits::quotas::Counting;
 use crate::use_cases::service::Service;
+use crate::work::TEMPLATE_BYTES;
 use bytes::Bytes;
+use futures::TryStreamExt;
 use ventriform::base::progress::Monitor;
 use ventriform::mesh::files::MeshStatement;
 
@@ -124,6 +126,57 @@ impl Service {
         let room = self.product_room(Resource::Normals, quota);
         self.add_named(by, (tenant, Resource::Normals), name, output, room)
             .await
+    }
+
+    /// Sets whether every `model=auto` of the tenant fits a template of it.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn set_library(
+        &self,
+        by: &Agent,
+        tenant: &Tenant,
+        template: &str,
+        library: bool,
+    ) -> Result<(), ServiceError> {
+        let (items, tenant, id) = (self.items().clone(), tenant.clone(), template.to_owned());
+        let set = async move {
+            let catalogue = items.catalogue();
+            catalogue.set_library(&tenant, &id, library).await
+        };
+        by.change::<_, StoreError>(set).await?;
+        Ok(())
+    }
+
+    /// The JSON mesh of a tenant's model or segmentation, with the id of its volume.
+    ///
+    /// # Errors
+    /// `invalid-field` if there is none, or it is too large for a template; if the storage fails.
+    pub async fn stored_mesh(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+    ) -> Result<(Bytes, Option<String>), ServiceError> {
+        let product = match Resource::from_id(id) {
+            Some(Resource::Model | Resource::Segmentation) => self.product(tenant, id).await?,
+            _ => None,
+        };
+        let Some(product) = product else {
+            return Err(self.names_nothing(tenant, "model", id).await?);
+        };
+        match product.file("mesh.json") {
+            Some(file) if file.bytes <= TEMPLATE_BYTES => {
+                let blobs = self.items().blobs();
+                let pieces = blobs.read(id, &file.record(), 0..file.bytes).await?;
+                let pieces: Vec<Bytes> = pieces.try_collect().await?;
+                Ok((pieces.concat().into(), product.volume.clone()))
+            }
+            _ => {
+                let detail = "The mesh of this model is too large to be fitted.";
+                let fix = "Name a model of at most 5000 points.";
+                Err(invalid_field("model", detail).fix(fix).into())
+            }
+        }
     }
 
     async fn add_named(

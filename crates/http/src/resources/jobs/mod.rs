@@ -18,8 +18,7 @@ use crate::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use crate::resources::scans::{self, ScanQuery};
 use crate::resources::tags::{self, TagQuery};
 use crate::wire::idempotency;
-use crate::wire::memory::read_row;
-use crate::wire::pagination::{PageQuery, charged_by_bytes, next_cursor};
+use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::not_found::missing;
 use crate::wire::problem::{Answer, Problem, ProblemBody};
 use crate::wire::query::{NoQuery, Query, moment};
@@ -187,10 +186,7 @@ pub async fn list_jobs(
         created_after: search.created_after,
     };
     let page = page.charged().await?;
-    let table = app.service.queue().table();
-    let plan = table.plan_jobs(&filter, page).await?;
-    let page = charged_by_bytes(page, plan).await?;
-    let page = table.jobs(&filter, page).await?;
+    let page = app.service.jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, caller.scope, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
@@ -225,9 +221,10 @@ pub async fn get_job(
             ControlFlow::Break((ask_again, Json(body)).into_response())
         })
     };
-    let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
-    let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
+    let kept = app
+        .answers
+        .get(&app.service, asker, Resource::Job, &id, read);
     Ok(match kept.await? {
         ControlFlow::Continue(answer) => answer.answer(&headers),
         ControlFlow::Break(answer) => answer,
@@ -308,15 +305,13 @@ pub async fn delete_job(
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
-            return Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await);
+            return Err(missing(&app, tenant, Resource::Job, &id).await);
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
             return match app.service.delete_job(&caller.by, &id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-                _ => {
-                    Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await)
-                }
+                _ => Err(missing(&app, tenant, Resource::Job, &id).await),
             };
         }
     };
@@ -325,10 +320,8 @@ pub async fn delete_job(
 
 /// The tenant's job of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
-    let table = app.service.queue().table();
-    let job = read_row(|bytes| table.job_within(id, bytes)).await?;
-    match job.filter(|job| job.tenant == *tenant) {
+    match app.service.job(tenant, id).await? {
         Some(job) => Ok(job),
-        None => Err(missing(app.service.items().catalogue(), tenant, Resource::Job, id).await),
+        None => Err(missing(app, tenant, Resource::Job, id).await),
     }
 }

@@ -9,25 +9,25 @@ use tokio::sync::Notify;
 /// The archives of a service.
 pub struct ArchiveDesk {
     /// The tables.
-    pub store: Arc<dyn ArchiveStore>,
+    pub(crate) store: Arc<dyn ArchiveStore>,
     /// Which DICOMweb services jobs may name beside the configured archives.
-    pub guard: UrlGuard,
+    pub(crate) guard: UrlGuard,
     /// Told when a delivery is due at once.
-    pub woken: Arc<Notify>,
+    pub(crate) woken: Arc<Notify>,
     /// Attempts to fetch.
-    pub pulls: Arc<ExchangeCounts>,
+    pub(crate) pulls: Arc<ExchangeCounts>,
     /// Attempts to deliver.
-    pub sends: Arc<ExchangeCounts>,
+    pub(crate) sends: Arc<ExchangeCounts>,
 }
 
 /// Figures of archives for operators.
 pub struct ArchiveReadings<'a> {
     /// The exchanges that wait.
-    pub backlog: ArchiveBacklog,
+    pub(crate) backlog: ArchiveBacklog,
     /// Attempts to fetch.
-    pub pulls: &'a ExchangeCounts,
+    pub(crate) pulls: &'a ExchangeCounts,
     /// Attempts to deliver.
-    pub sends: &'a ExchangeCounts,
+    pub(crate) sends: &'a ExchangeCounts,
 }
 
 impl ArchiveDesk {

@@ -6,9 +6,9 @@ use std::sync::Arc;
 /// The webhooks of a service.
 pub struct Hooks {
     /// The tables.
-    pub store: Arc<dyn DeliveryStore>,
+    pub(crate) store: Arc<dyn DeliveryStore>,
     /// Which URLs may be told.
-    pub guard: UrlGuard,
+    pub(crate) guard: UrlGuard,
     /// Sends deliveries.
-    pub dispatcher: Arc<Dispatcher>,
+    pub(crate) dispatcher: Arc<Dispatcher>,
 }

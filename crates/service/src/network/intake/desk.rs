@@ -6,11 +6,11 @@ use std::sync::Arc;
 /// The reception of objects.
 pub struct Intake {
     /// Takes objects.
-    pub receiver: Arc<Receiver>,
+    pub(crate) receiver: Arc<Receiver>,
     /// The groups that wait.
-    pub sessions: Arc<Sessions>,
+    pub(crate) sessions: Arc<Sessions>,
     /// The tables.
-    pub store: Arc<dyn IntakeStore>,
+    pub(crate) store: Arc<dyn IntakeStore>,
     /// The files.
-    pub files: Arc<dyn ReceivedFiles>,
+    pub(crate) files: Arc<dyn ReceivedFiles>,
 }
