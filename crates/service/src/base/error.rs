@@ -27,6 +27,9 @@ pub struct ServiceError {
     pub retry_after: Option<Duration>,
 }
 
+/// The result of a use case.
+pub type ServiceResult<T> = Result<T, ServiceError>;
+
 /// The kind of a [`ServiceError`], by what the caller can do about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -111,6 +114,59 @@ impl ServiceError {
         } else {
             self
         }
+    }
+}
+
+/// Why an attempt failed that nobody waits for: a fetch, a delivery, a volume of received objects.
+#[derive(Debug)]
+pub enum AttemptError {
+    /// It may succeed later.
+    Retry {
+        /// The cause, as a sentence without patient data.
+        why: String,
+        /// How long the other side asks to wait.
+        asked: Option<Duration>,
+    },
+    /// Trying again does not help.
+    Permanent(Failure),
+}
+
+impl AttemptError {
+    /// One that may pass.
+    pub fn retry(why: impl Into<String>) -> Self {
+        Self::Retry {
+            why: why.into(),
+            asked: None,
+        }
+    }
+
+    /// One that lasts, with its code, what happened and what to do about it.
+    pub fn permanent(fault: Fault, code: &str, what: impl Into<String>, fix: &str) -> Self {
+        Self::Permanent(Failure::new(fault, code, what).fix(fix))
+    }
+
+    /// The cause.
+    pub fn why(&self) -> &str {
+        match self {
+            Self::Retry { why, .. } => why,
+            Self::Permanent(failure) => &failure.detail,
+        }
+    }
+}
+
+impl From<ServiceError> for AttemptError {
+    fn from(error: ServiceError) -> Self {
+        match error.may_pass() {
+            true => Self::retry(error.failure.detail),
+            false => Self::Permanent(*error.failure),
+        }
+    }
+}
+
+impl From<StoreError> for AttemptError {
+    fn from(error: StoreError) -> Self {
+        tracing::error!(%error, "the storage failed during an attempt");
+        Self::retry("The storage of this service failed.")
     }
 }
 
