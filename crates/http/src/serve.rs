@@ -32,7 +32,12 @@ pub fn serve(
         loopback: entrance.loopback,
         open: entrance.open,
     };
-    let guard = Guard::new(entrance.gate, hosts, settings, !entrance.loopback);
+    let guard = Guard::new(
+        entrance.gate,
+        hosts,
+        settings.auth_failure_limit,
+        !entrance.loopback,
+    );
     listener.set_nonblocking(true)?;
     let listener = tokio::net::TcpListener::from_std(listener)?;
     let open = service.request_metrics().connections.clone();

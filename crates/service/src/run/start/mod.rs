@@ -21,7 +21,7 @@ use crate::config::stores::Stores;
 use crate::config::{Role, Settings};
 use crate::items::{Items, RetentionAges};
 use crate::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
-use crate::limits::decoding::Decoding;
+use crate::limits::decoding::{Decoding, DecodingLimits};
 use crate::limits::quotas::Quotas;
 use crate::network::archive::ArchiveDesk;
 use crate::network::hooks::{Dispatcher, HookSettings, Hooks, RetrySchedule, UrlGuard};
@@ -133,10 +133,14 @@ pub async fn open(
     let metrics = Metrics::new();
     let spans = Spans::new(settings.otlp_endpoint.0.as_deref(), &*http_clients)?;
     queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
-    let decoding = Arc::new(Decoding::new(
-        &settings,
-        metrics.requests.decoding_waits.clone(),
-    ));
+    let limits = DecodingLimits {
+        memory: settings.decoding_memory.0,
+        queue: settings.decoding_queue,
+        time: settings.decoding_time.0,
+        rate: settings.decoding_rate.0,
+    };
+    let waits = metrics.requests.decoding_waits.clone();
+    let decoding = Arc::new(Decoding::new(limits, waits));
     let service = Service {
         engine,
         access: stores.access.clone(),
