@@ -5,12 +5,13 @@ use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::edge::guard::AlreadyRecorded;
 use crate::openapi::{ListProblems, LookupProblems, UploadProblems};
+use crate::wire::fields::{Count, FieldReader, given};
 use crate::wire::links::rfc3339;
 use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::{Answer, Problem, ProblemBody, shorten};
 use crate::wire::public_base::public_path;
-use crate::wire::query::{NoQuery, Query};
-use crate::wire::request::{PathSegments, json_object, unknown};
+use crate::wire::query::{Moment, NoQuery, Query};
+use crate::wire::request::PathSegments;
 use crate::wire::words::{ScopeName, Word};
 use axum::Extension;
 use axum::Json;
@@ -18,10 +19,9 @@ use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::base::records::{Timestamp, parse_rfc3339};
-use ventriform_service::callers::{ApiKey, Maker, Quota, Scope};
+use ventriform_service::base::records::Timestamp;
+use ventriform_service::callers::{ApiKey, Maker, Quota};
 use ventriform_service::use_cases::keys::KeyOrder;
 
 /// A key. Its secret is shown once, when it is made.
@@ -93,38 +93,57 @@ pub struct KeyList {
 }
 
 /// A key to be made.
-#[derive(ToSchema)]
-#[expect(
-    dead_code,
-    reason = "it documents the body, which is read field by field"
-)]
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 pub struct NewKey {
     /// Its name, which says what it is for.
-    #[schema(min_length = 1, max_length = 80, example = "scanner 2")]
-    name: String,
+    #[serde(default, deserialize_with = "given")]
+    #[schema(
+        required = true,
+        nullable = false,
+        min_length = 1,
+        max_length = 80,
+        example = "scanner 2"
+    )]
+    name: Option<String>,
     /// The acts that it allows: `read`, `submit` or `admin`.
-    #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
-    scope: String,
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = String, required = true, pattern = "^(read|submit|admin)$", example = "submit")]
+    scope: Option<ScopeName>,
     /// From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
     /// never ends.
-    #[schema(format = DateTime)]
-    expires_at: Option<String>,
+    #[schema(value_type = Option<String>, format = DateTime)]
+    expires_at: Option<Moment>,
     /// Requests per minute; the service's general limit if absent.
-    requests_per_minute: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    requests_per_minute: Option<Count>,
     /// Bytes that the tenant may store; the service's general limit if absent.
-    stored_bytes: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    stored_bytes: Option<Count>,
     /// Jobs of the tenant that may wait; the service's general limit if absent.
-    queued_jobs: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    queued_jobs: Option<Count>,
 }
 
-const KEY_FIELDS: [&str; 6] = [
-    "name",
-    "scope",
-    "expires_at",
-    "requests_per_minute",
-    "stored_bytes",
-    "queued_jobs",
-];
+impl NewKey {
+    fn order(self) -> Answer<KeyOrder> {
+        let missing = |field: &str| {
+            Problem::invalid_field(field, format!("`{field}` is missing."))
+                .fix("Give a name, and one of the scopes read, submit and admin.")
+        };
+        let count = |given: Option<Count>| given.map(|count| count.0);
+        Ok(KeyOrder {
+            name: self.name.ok_or_else(|| missing("name"))?,
+            scope: self.scope.ok_or_else(|| missing("scope"))?.0,
+            expires_at: self.expires_at.map(|moment| moment.0),
+            quota: Quota {
+                requests: count(self.requests_per_minute),
+                bytes: count(self.stored_bytes),
+                jobs: count(self.queued_jobs),
+            },
+        })
+    }
+}
 
 /// Make a key
 ///
@@ -144,7 +163,10 @@ pub async fn create_key(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let order = read(&json_object(&app, request).await?)?;
+    let order = FieldReader::read(&app, request)
+        .await?
+        .all::<NewKey>()?
+        .order()?;
     let service = &app.service;
     let made = service.create_key(&caller.by, &caller.identity, order);
     let (key, text) = made.await?;
@@ -204,7 +226,7 @@ pub async fn revoke_key(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer {
-    let revoked = app.service.revoke_key(&caller.by, &caller.tenant, &id);
+    let revoked = app.service.revoke_key(&caller.by, &id);
     if !revoked.await? {
         return Err(Problem::new(
             StatusCode::NOT_FOUND,
@@ -255,60 +277,9 @@ pub async fn revoke_keys_of_owner(
         Problem::invalid_field("owner", "`owner` is missing. Nothing was revoked.")
             .fix("Give the `owner` that GET /v1/keys shows; or DELETE /v1/keys/ID for one key.")
     })?;
-    let (service, tenant) = (&app.service, &caller.tenant);
-    let revoked = service.revoke_keys_of(&caller.by, tenant, &owner).await?;
+    let revoked = app.service.revoke_keys_of(&caller.by, &owner).await?;
     app.guard.gate.refresh();
     Ok((Extension(AlreadyRecorded), Json(RevokedKeys { revoked })).into_response())
-}
-
-fn read(object: &Map<String, Value>) -> Answer<KeyOrder> {
-    if let Some(name) = object
-        .keys()
-        .find(|name| !KEY_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &KEY_FIELDS));
-    }
-    for required in ["name", "scope"] {
-        if !object.contains_key(required) {
-            return Err(
-                Problem::invalid_field(required, format!("`{required}` is missing."))
-                    .fix("Give a name, and one of the scopes read, submit and admin."),
-            );
-        }
-    }
-    let wrong = |field: &str, fix: &str| {
-        Problem::invalid_field(field, format!("`{field}` cannot be used.")).fix(fix)
-    };
-    let text = |field: &str, fix: &str| match object.get(field) {
-        None | Some(Value::Null) => Ok(None),
-        Some(Value::String(text)) => Ok(Some(text.clone())),
-        Some(_) => Err(wrong(field, fix)),
-    };
-    let number = |field: &str| match object.get(field) {
-        None | Some(Value::Null) => Ok(None),
-        Some(value) => value
-            .as_u64()
-            .filter(|number| i64::try_from(*number).is_ok())
-            .map(Some)
-            .ok_or_else(|| wrong(field, "Give a whole number from 0 to 9223372036854775807.")),
-    };
-    let scopes = "Give one of read, submit, admin.";
-    let scope = text("scope", scopes)?.and_then(|name| name.parse::<Scope>().ok());
-    let scope = scope.ok_or_else(|| wrong("scope", scopes))?;
-    let time = "Give a time such as 2027-01-31T00:00:00Z.";
-    let expires_at = text("expires_at", time)?
-        .map(|text| parse_rfc3339(&text).ok_or_else(|| wrong("expires_at", time)))
-        .transpose()?;
-    Ok(KeyOrder {
-        name: text("name", "Give a text.")?.unwrap_or_default(),
-        scope,
-        expires_at,
-        quota: Quota {
-            requests: number("requests_per_minute")?,
-            bytes: number("stored_bytes")?,
-            jobs: number("queued_jobs")?,
-        },
-    })
 }
 
 impl KeyBody {

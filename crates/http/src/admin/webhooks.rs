@@ -5,14 +5,15 @@
 
 use crate::app::App;
 use crate::edge::caller::Caller;
-use crate::openapi::{self, FileProblems, ListProblems, LookupProblems};
+use crate::openapi::{FileProblems, ListProblems, LookupProblems};
 use crate::resources::jobs::{self, ObjectDeliveryBody};
+use crate::wire::fields::FieldReader;
 use crate::wire::links::rfc3339;
 use crate::wire::problem::{Answer, Problem, shorten};
 use crate::wire::public_base::public_path;
 use crate::wire::query::NoQuery;
-use crate::wire::request::{PathSegments, json_object};
-use crate::wire::webhook_request::given_webhook;
+use crate::wire::request::PathSegments;
+use crate::wire::webhook_request::WebhookRequest;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
@@ -86,7 +87,7 @@ pub struct WebhookSecret {
 /// The receiver is told about every job of the caller's tenant, in requests signed after Standard
 /// Webhooks. The answer shows the signing secret; no later answer does.
 #[utoipa::path(post, path = "/v1/webhooks", tag = "webhooks",
-    request_body(content = openapi::WebhookRequest, content_type = "application/json"),
+    request_body(content = WebhookRequest, content_type = "application/json"),
     responses(
         (status = 201, description = "Registered", body = WebhookBody,
             headers(("Location" = String, description = "The webhook's path"))),
@@ -98,11 +99,8 @@ pub async fn create_webhook(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let object = json_object(&app, request).await?;
-    let given = given_webhook(&object)?;
-    let registered = app
-        .service
-        .register_webhook(&caller.by, &caller.tenant, given);
+    let given: WebhookRequest = FieldReader::read(&app, request).await?.all()?;
+    let registered = app.service.register_webhook(&caller.by, given.into());
     let (endpoint, secret) = registered.await?;
     let location = public_path(&format!("/v1/webhooks/{}", endpoint.id));
     let body = WebhookBody::new(endpoint, Some(secret.reveal()));
@@ -140,8 +138,7 @@ pub async fn delete_webhook(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer<StatusCode> {
-    let (service, tenant) = (&app.service, &caller.tenant);
-    if service.remove_webhook(&caller.by, tenant, &id).await? {
+    if app.service.remove_webhook(&caller.by, &id).await? {
         Ok(StatusCode::NO_CONTENT)
     } else {
         Err(nothing_here("webhook", &id, "GET /v1/webhooks"))
@@ -155,7 +152,7 @@ pub async fn delete_webhook(
 #[utoipa::path(post, path = "/v1/webhooks/secret", tag = "webhooks",
     responses((status = 200, description = "The new secret", body = WebhookSecret), ListProblems))]
 pub async fn create_webhook_secret(State(app): State<App>, caller: Caller, _: NoQuery) -> Answer {
-    let renewed = app.service.renew_signing_secret(&caller.by, &caller.tenant);
+    let renewed = app.service.renew_signing_secret(&caller.by);
     let (secret, until) = renewed.await?;
     let body = WebhookSecret {
         secret: secret.reveal(),
@@ -273,8 +270,7 @@ pub async fn redeliver(
     PathSegments((id, delivery)): PathSegments<(String, String)>,
     _: NoQuery,
 ) -> Answer {
-    let service = &app.service;
-    let found = service.redeliver(&caller.by, &caller.tenant, &id, &delivery);
+    let found = app.service.redeliver(&caller.by, &id, &delivery);
     let body = match found.await? {
         Some(Redelivered::Message(message)) => RedeliveredBody::Message(message.into()),
         Some(Redelivered::Object(object)) => RedeliveredBody::Object(object.into()),

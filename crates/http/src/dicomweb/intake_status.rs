@@ -163,10 +163,7 @@ pub async fn forget_received(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let erased = app
-        .service
-        .forget_received(&caller.by, &caller.tenant, &id)
-        .await?;
+    let erased = app.service.forget_received(&caller.by, &id).await?;
     let receipt = erased.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,

@@ -64,7 +64,7 @@ fn bare_uid(query: &QueryReader) -> Option<String> {
 #[utoipa::path(post, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "create_workitem",
     params(WorkitemQuery),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses(
         (status = 201, description = "Created",
             headers(("Location" = String, description = "The item's path"))),
@@ -89,8 +89,8 @@ pub async fn create_workitem(
     };
     let uid = named.map_or_else(new_uid, str::to_owned);
     require_uid(field, &uid)?;
-    let (service, tenant) = (&app.service, &caller.tenant);
-    let created = service.create_workitem(&caller.by, tenant, &uid, attributes, &counting);
+    let service = &app.service;
+    let created = service.create_workitem(&caller.by, &uid, attributes, &counting);
     let (added, completed) = match created.await? {
         CreatedWorkitem::Stored { added, completed } => (added, completed),
         CreatedWorkitem::Refused(refusal) => return Err(refused(refusal)),
@@ -129,7 +129,7 @@ pub async fn create_workitem(
     operation_id = "get_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item")),
     responses(
-        (status = 200, description = "The item", body = openapi::WorkitemBody,
+        (status = 200, description = "The item", body = openapi::DicomJson,
             content_type = "application/dicom+json"),
         openapi::ScopeProblems, LookupProblems))]
 pub async fn get_workitem(
@@ -163,10 +163,7 @@ pub async fn delete_workitem(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let erased = app
-        .service
-        .erase_workitem(&caller.by, &caller.tenant, &uid)
-        .await?;
+    let erased = app.service.erase_workitem(&caller.by, &uid).await?;
     match erased {
         Erased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
         Erased::InUse | Erased::OnHold { .. } => Err(Problem::new(
@@ -202,7 +199,7 @@ pub struct SearchQuery {
     operation_id = "search_workitems",
     params(SearchQuery),
     responses(
-        (status = 200, description = "The items", body = openapi::WorkitemBody,
+        (status = 200, description = "The items", body = openapi::DicomJson,
             content_type = "application/dicom+json"),
         (status = 204, description = "No item matches"),
         (status = 413, description = "The search takes too long",
@@ -229,8 +226,8 @@ pub async fn search_workitems(
                 .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
         })?;
     }
-    let (service, tenant) = (&app.service, &caller.tenant);
-    let found = service.search_workitems(tenant, &matching, skip, limit);
+    let service = &app.service;
+    let found = service.search_workitems(&caller.tenant, &matching, skip, limit);
     let FoundWorkitems { text, more } = found.await?;
     if text.is_empty() {
         return Ok(StatusCode::NO_CONTENT.into_response());
@@ -256,7 +253,7 @@ pub async fn search_workitems(
     operation_id = "update_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
         TransactionQuery, openapi::TransactionHeader),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses((status = 200, description = "Changed"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn update_workitem(
@@ -269,8 +266,8 @@ pub async fn update_workitem(
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let (changes, stated) = claimed_data_set(&app, query, &headers, request).await?;
-    let (service, tenant, stated) = (&app.service, &caller.tenant, stated.as_deref());
-    let updated = service.update_workitem(&caller.by, tenant, &uid, stated, &changes, &counting);
+    let (service, stated) = (&app.service, stated.as_deref());
+    let updated = service.update_workitem(&caller.by, &uid, stated, &changes, &counting);
     changed(&app, &caller, &uid, updated.await?).await?;
     Ok(StatusCode::OK.into_response())
 }
@@ -283,7 +280,7 @@ pub async fn update_workitem(
     operation_id = "change_workitem_state",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
         TransactionQuery, openapi::TransactionHeader),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses((status = 200, description = "The item is in this state"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn change_workitem_state(
@@ -328,7 +325,7 @@ pub async fn change_workitem_state(
 #[utoipa::path(post, path = "/dicom-web/workitems/{uid}/cancelrequest", tag = "workitems",
     operation_id = "cancel_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item")),
-    request_body(content = Option<openapi::WorkitemBody>, content_type = "application/dicom+json"),
+    request_body(content = Option<openapi::DicomJson>, content_type = "application/dicom+json"),
     responses((status = 202, description = "Accepted"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn cancel_workitem(
@@ -362,8 +359,7 @@ async fn change(
     uid: &str,
     how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
 ) -> Answer<Change> {
-    let service = &app.service;
-    let outcome = service.change_workitem(&caller.by, &caller.tenant, uid, how);
+    let outcome = app.service.change_workitem(&caller.by, uid, how);
     changed(app, caller, uid, outcome.await?).await
 }
 

@@ -13,13 +13,12 @@
 //! 6. Every operation takes `X-Request-Id`.
 //! 7. What several operations have alike stands under `components` ([`super::share`]).
 
-use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
+use super::bodies::{ANY_JOB_REQUESTS, job_discriminator, job_requests};
 use super::result_files::{self, binary, report_of};
 use super::share::share;
 use super::walk::{answers, contents, operations};
 use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
-use utoipa::ToSchema;
 
 /// Requests and answers as a running service gave them.
 const RECORDED_EXAMPLES: &str = include_str!("examples.json");
@@ -149,8 +148,8 @@ fn require_input(schemas: &mut Value) {
         request["if"] = json!({"not": {"required": ["volume"]}});
         request["then"] = json!({"required": ["source"]});
     }
-    for request in [VolumeJobRequest::name(), SourceJobRequest::name()] {
-        schemas[&*request]["discriminator"] = json!(job_discriminator());
+    for (request, _) in ANY_JOB_REQUESTS {
+        schemas[request]["discriminator"] = json!(job_discriminator());
     }
 }
 

@@ -189,8 +189,7 @@ pub async fn erase(
     cascade: bool,
     headers: &HeaderMap,
 ) -> Answer {
-    let service = &app.service;
-    let erased = service.erase_item(&caller.by, &caller.tenant, kind, &id, cascade);
+    let erased = app.service.erase_item(&caller.by, kind, &id, cascade);
     match erased.await? {
         Erased::Done(receipt) => Ok(acknowledged(*receipt, headers)),
         Erased::Unknown => Err(missing(app, &caller.tenant, kind, &id).await),

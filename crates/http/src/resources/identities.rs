@@ -57,8 +57,8 @@ pub async fn state_identity(
 ) -> Answer<Json<Map<String, Value>>> {
     let stated = json_object(&app, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let (service, tenant) = (&app.service, &caller.tenant);
-    let state = service.state_scan(&caller.by, tenant, &id, &volume.files, stated);
+    let service = &app.service;
+    let state = service.state_scan(&caller.by, &id, &volume.files, stated);
     state.await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(volume.ownership.scan.whole()))
@@ -81,8 +81,7 @@ pub async fn erase_identity(
     _: NoQuery,
 ) -> Answer<StatusCode> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let service = &app.service;
-    if service.erase_scan(&caller.by, &caller.tenant, &id).await? {
+    if app.service.erase_scan(&caller.by, &id).await? {
         return Ok(StatusCode::NO_CONTENT);
     }
     // It was erased after it was looked up, or it is on hold.

@@ -191,7 +191,7 @@ pub async fn erase_volumes(
     };
     charge(PLAN_MEMORY).await?;
     if query.dry_run.unwrap_or(false) {
-        let plan = app.service.plan_scan_erasure(&order).await?;
+        let plan = app.service.items().plan_scan_erasure(&order).await?;
         if plan.is_too_large {
             return Err(too_large());
         }
@@ -201,7 +201,7 @@ pub async fn erase_volumes(
         let body = Json(PlanBody::from(plan));
         return Ok((unkept, Extension(AlreadyRecorded), body).into_response());
     }
-    match app.service.erase_scans(order).await? {
+    match app.service.items().erase_scans(order).await? {
         ScansErased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
         ScansErased::Kept(plan) => Err(kept(&plan)),
         ScansErased::Differs(plan) => Err(Problem::new(

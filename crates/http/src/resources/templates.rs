@@ -6,10 +6,11 @@ use crate::edge::quota::reserve_item;
 use crate::openapi::{self, LookupProblems, UploadProblems};
 use crate::resources::collection::find;
 use crate::resources::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use crate::wire::fields::{FieldReader, given};
 use crate::wire::links::{added, path_of, rfc3339};
 use crate::wire::problem::{Answer, Problem, ProblemBody};
 use crate::wire::query::{NoQuery, Query};
-use crate::wire::request::{PathSegments, bytes_of, merge_patch, unknown};
+use crate::wire::request::{PathSegments, bytes_of};
 use crate::wire::upload::media_types::MESH_TYPES;
 use crate::wire::words::{MeshFrameName, MeshUnitName, OrganName};
 use axum::Json;
@@ -187,6 +188,16 @@ pub async fn create_template(
     Ok(added(new, &body.id, &body))
 }
 
+/// A JSON merge patch of a template's setting.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TemplatePatch {
+    /// Whether every `model=auto` fits the template
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = Option<bool>)]
+    library: Option<Option<bool>>,
+}
+
 /// Change a template's setting
 ///
 /// A JSON merge patch (RFC 7396) of `library`: whether every `model=auto` fits it, beside the built-in
@@ -195,8 +206,8 @@ pub async fn create_template(
     operation_id = "update_template",
     params(("id" = String, Path, description = "The template's id")),
     request_body(content(
-        (openapi::TemplatePatch = "application/merge-patch+json"),
-        (openapi::TemplatePatch = "application/json"))),
+        (TemplatePatch = "application/merge-patch+json"),
+        (TemplatePatch = "application/json"))),
     responses((status = 200, description = "The template", body = TemplateBody),
         openapi::PatchProblems, LookupProblems))]
 pub async fn update_template(
@@ -208,28 +219,15 @@ pub async fn update_template(
 ) -> Answer<Json<TemplateBody>> {
     let tenant = &caller.tenant;
     find::<Templates>(&app, tenant, &id).await?;
-    for (field, value) in &merge_patch(&app, request).await? {
-        let library = match (field.as_str(), value) {
-            (LIBRARY_FIELD, Value::Bool(library)) => *library,
-            (LIBRARY_FIELD, Value::Null) => false,
-            (LIBRARY_FIELD, _) => {
-                return Err(Problem::invalid_field(
-                    LIBRARY_FIELD,
-                    "`library` must be true or false.",
-                )
-                .fix("Give true if every `model=auto` is to fit the template."));
-            }
-            (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
-        };
-        let set = app.service.set_library(&caller.by, tenant, &id, library);
+    let patch: TemplatePatch = FieldReader::read_patch(&app, request).await?.all()?;
+    if let Some(library) = patch.library {
+        let library = library.unwrap_or(false);
+        let set = app.service.set_library(&caller.by, &id, library);
         set.await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::from_held(&app, template).into()))
 }
-
-/// The setting that [`TemplateBody`] shows.
-const LIBRARY_FIELD: &str = "library";
 
 /// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.
 async fn given_mesh(

@@ -1,14 +1,14 @@
-//! Reading a webhook from a request: from a JSON object, or from the query and headers of an upload.
+//! The webhook of a request: in a JSON object, or in the query and headers of an upload.
 
 use crate::app::App;
-use crate::wire::problem::{Answer, Problem};
-use crate::wire::request::{text, unknown};
+use crate::wire::fields::given;
+use crate::wire::problem::Answer;
+use crate::wire::words::HookEventName;
 use axum::http::{HeaderMap, HeaderName};
 use serde::Deserialize;
-use serde_json::{Map, Value};
-use utoipa::IntoParams;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::base::records::JobWebhook;
-use ventriform_service::use_cases::webhooks::{GivenWebhook, events_fix, no_url};
+use ventriform_service::use_cases::webhooks::{GivenWebhook, no_url};
 
 /// The header with the signing secret of a job's webhook.
 pub const SECRET_HEADER: HeaderName = HeaderName::from_static("webhook-secret");
@@ -23,32 +23,43 @@ pub struct WebhookQuery {
     webhook_events: Option<String>,
 }
 
-/// The fields of a webhook.
-const WEBHOOK_FIELDS: [&str; 3] = ["url", "events", "secret"];
+/// A receiver to be told about jobs.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WebhookRequest {
+    /// Where to send deliveries: https, and a public host unless the operator allows it
+    #[serde(default, deserialize_with = "given")]
+    #[schema(
+        required = true,
+        nullable = false,
+        format = "uri",
+        max_length = 2048,
+        examples("https://ris.example.org/hooks/ventriform")
+    )]
+    url: Option<String>,
+    /// What to tell; the three ends of a job unless given
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = Vec<HookEventName>, required = false, min_items = 1)]
+    events: Option<Vec<String>>,
+    /// What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never
+    /// shown again
+    #[serde(default, deserialize_with = "given")]
+    #[schema(
+        nullable = false,
+        pattern = "^whsec_[A-Za-z0-9+/]{32,88}={0,2}$",
+        examples("whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw")
+    )]
+    secret: Option<String>,
+}
 
-/// The webhook in a JSON object.
-///
-/// # Errors
-/// 400 for an unknown field, 422 for one of another type.
-pub fn given_webhook(object: &Map<String, Value>) -> Answer<GivenWebhook> {
-    if let Some(name) = object
-        .keys()
-        .find(|n| !WEBHOOK_FIELDS.contains(&n.as_str()))
-    {
-        return Err(unknown("field", name, &WEBHOOK_FIELDS));
+impl From<WebhookRequest> for GivenWebhook {
+    fn from(request: WebhookRequest) -> Self {
+        Self {
+            url: request.url,
+            events: request.events,
+            secret: request.secret,
+        }
     }
-    let events = match object.get("events") {
-        None => None,
-        Some(events) => Some(serde_json::from_value(events.clone()).map_err(|_| {
-            Problem::invalid_field("events", "`events` must be a list of strings.")
-                .fix(events_fix())
-        })?),
-    };
-    Ok(GivenWebhook {
-        url: text(object, "url")?.map(str::to_owned),
-        events,
-        secret: text(object, "secret")?.map(str::to_owned),
-    })
 }
 
 /// The webhook of an upload, with the secret in the header `Webhook-Secret`.
@@ -80,23 +91,11 @@ pub async fn webhook_of_upload(
     job_webhook(app, given).await.map(Some)
 }
 
-async fn job_webhook(app: &App, given: GivenWebhook) -> Answer<JobWebhook> {
-    let checked = app.service.job_webhook(given).await;
+/// The webhook of a job.
+///
+/// # Errors
+/// 422 that names the part of it which cannot be used.
+pub async fn job_webhook(app: &App, given: impl Into<GivenWebhook>) -> Answer<JobWebhook> {
+    let checked = app.service.job_webhook(given.into()).await;
     Ok(checked.map_err(|failure| failure.within("webhook"))?)
-}
-
-/// The webhook in the field `webhook` of a job.
-pub async fn webhook_of(app: &App, object: &Map<String, Value>) -> Answer<Option<JobWebhook>> {
-    let given = match object.get("webhook") {
-        None => return Ok(None),
-        Some(Value::Object(given)) => given_webhook(given),
-        Some(_) => {
-            return Err(
-                Problem::invalid_field("webhook", "`webhook` must be a JSON object.")
-                    .fix("Give an object such as {\"url\": \"https://example.org/hook\"}."),
-            );
-        }
-    };
-    let given = given.map_err(|problem| problem.within("webhook"))?;
-    job_webhook(app, given).await.map(Some)
 }

@@ -6,7 +6,7 @@
 //! it; one made with a token may, if the operator allows it (`oidc_key_life`). No row of keys, one made by the other, is
 //! longer than [`MOST_MAKERS`].
 
-use crate::base::error::{ServiceError, invalid_field};
+use crate::base::error::{ServiceError, ServiceResult, invalid_field};
 use crate::base::records::{ListPage, ListRequest, Tenant, Timestamp, rfc3339};
 use crate::callers::{
     Activity, Agent, ApiKey, Identity, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
@@ -45,7 +45,7 @@ impl Service {
         by: &Agent,
         maker: &Identity,
         order: KeyOrder,
-    ) -> Result<(ApiKey, String), ServiceError> {
+    ) -> ServiceResult<(ApiKey, String)> {
         let now = self.now();
         let request = self.granted(maker, order, now)?;
         let (key, text) = ApiKey::make(request, now).map_err(unusable)?;
@@ -55,29 +55,18 @@ impl Service {
     }
 
     /// A page of a tenant's keys, newest first, revoked ones included.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn keys(
         &self,
         tenant: &Tenant,
         page: ListRequest,
-    ) -> Result<ListPage<ApiKey>, ServiceError> {
+    ) -> ServiceResult<ListPage<ApiKey>> {
         Ok(self.access.keys(Some(tenant), page).await?)
     }
 
     /// Revokes a key of the tenant. `false` if it has none with that id.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn revoke_key(
-        &self,
-        by: &Agent,
-        tenant: &Tenant,
-        id: &str,
-    ) -> Result<bool, ServiceError> {
+    pub async fn revoke_key(&self, by: &Agent, id: &str) -> ServiceResult<bool> {
         let key = self.access.key(id).await?;
-        if key.is_none_or(|key| key.tenant != *tenant) {
+        if key.is_none_or(|key| key.tenant != *by.tenant()) {
             return Ok(false);
         }
         let now = self.now();
@@ -87,18 +76,12 @@ impl Service {
 
     /// Revokes the tenant's keys of one subject of the OpenID Connect issuer. Returns the ids of those that were not
     /// revoked before.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn revoke_keys_of(
-        &self,
-        by: &Agent,
-        tenant: &Tenant,
-        owner: &str,
-    ) -> Result<Vec<String>, ServiceError> {
+    pub async fn revoke_keys_of(&self, by: &Agent, owner: &str) -> ServiceResult<Vec<String>> {
         let now = self.now();
         let event = by.event(Activity::KeyRevoked, now);
-        let revoked = self.access.revoke_keys_of(owner, Some(tenant), now, &event);
+        let revoked = self
+            .access
+            .revoke_keys_of(owner, Some(by.tenant()), now, &event);
         Ok(revoked.await?)
     }
 
@@ -108,7 +91,7 @@ impl Service {
         maker: &Identity,
         order: KeyOrder,
         now: Timestamp,
-    ) -> Result<KeyRequest, ServiceError> {
+    ) -> ServiceResult<KeyRequest> {
         if !maker.scope.includes(order.scope) {
             return Err(beyond("scope", maker.scope));
         }

@@ -3,7 +3,7 @@
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets
 //! the same limits; here they are refused before the body is read, and read under the budget of decoding.
 
-use crate::base::error::{Refusal, ServiceError, invalid_field};
+use crate::base::error::{Refusal, ServiceError, ServiceResult, invalid_field};
 use crate::base::records::{
     ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, StoreError, Tenant,
 };
@@ -60,7 +60,7 @@ impl Service {
         mesh: GivenMesh,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let bytes = mesh.bytes.len() as u64;
         let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * bytes;
         let (reader, organ) = (self.engine.reader.clone(), mesh.organ.clone());
@@ -94,7 +94,7 @@ impl Service {
         profile: Bytes,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let reader = self.engine.reader.clone();
         let bytes = profile.len() as u64;
         let check = move |_: &Monitor<'_>| reader.profile(&profile);
@@ -117,7 +117,7 @@ impl Service {
         limits: Bytes,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let bytes = limits.len() as u64;
         let memory = LITTLE_MEMORY + LIMITS_MEMORY_PER_BYTE * bytes;
         let reader = self.engine.reader.clone();
@@ -129,17 +129,14 @@ impl Service {
     }
 
     /// Sets whether every `model=auto` of the tenant fits a template of it.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn set_library(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         template: &str,
         library: bool,
-    ) -> Result<(), ServiceError> {
-        let (items, tenant, id) = (self.items().clone(), tenant.clone(), template.to_owned());
+    ) -> ServiceResult<()> {
+        let (items, tenant) = (self.items().clone(), by.tenant().clone());
+        let id = template.to_owned();
         let set = async move {
             let catalogue = items.catalogue();
             catalogue.set_library(&tenant, &id, library).await
@@ -156,7 +153,7 @@ impl Service {
         &self,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<(Bytes, Option<String>), ServiceError> {
+    ) -> ServiceResult<(Bytes, Option<String>)> {
         let product = match Resource::from_id(id) {
             Some(Resource::Model | Resource::Segmentation) => self.product(tenant, id).await?,
             _ => None,
@@ -186,7 +183,7 @@ impl Service {
         name: &str,
         output: WorkOutput,
         room: ProductRoom,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let (items, tenant, name) = (self.items().clone(), tenant.clone(), name.to_owned());
         let add = async move {
             let added = items.add_named((&tenant, made), &name, output, room);
@@ -200,11 +197,7 @@ impl Service {
     ///
     /// # Errors
     /// `library-full`.
-    pub async fn require_product_room(
-        &self,
-        tenant: &Tenant,
-        kind: Resource,
-    ) -> Result<(), ServiceError> {
+    pub async fn require_product_room(&self, tenant: &Tenant, kind: Resource) -> ServiceResult<()> {
         let limit = self.product_room(kind, Quota::default()).count;
         let page = ListRequest {
             before: None,

@@ -1,6 +1,6 @@
 //! What operators read of a running service: metrics, readiness, the audit trail.
 
-use crate::base::error::ServiceError;
+use crate::base::error::ServiceResult;
 use crate::base::records::{ListPage, ListRequest};
 use crate::callers::{AuditFilter, AuditRecord};
 use crate::telemetry::{Check, Dependencies, MetricReadings, why_unready};
@@ -8,10 +8,7 @@ use crate::use_cases::service::Service;
 
 impl Service {
     /// The metrics in the text format of Prometheus.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn metrics_text(&self) -> Result<String, ServiceError> {
+    pub async fn metrics_text(&self) -> ServiceResult<String> {
         let reading = MetricReadings {
             load: self.queue.table().load().await?,
             figures: self.figures.queue_figures().await?,
@@ -37,14 +34,11 @@ impl Service {
     }
 
     /// A page of the audit trail, newest first.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn audit_trail(
         &self,
         filter: &AuditFilter,
         page: ListRequest,
-    ) -> Result<ListPage<AuditRecord>, ServiceError> {
+    ) -> ServiceResult<ListPage<AuditRecord>> {
         // What was noted within the last second belongs to the answer.
         self.recorder.flush().await;
         Ok(self.access.audit(filter, page).await?)

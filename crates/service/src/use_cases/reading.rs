@@ -4,7 +4,7 @@
 //! [`read_row`] says, for a page by the bytes that the database plans for it. `None` is a row that the tenant does not
 //! have; [`Service::erased_at`] tells whether it had it.
 
-use crate::base::error::ServiceError;
+use crate::base::error::ServiceResult;
 use crate::base::memory::{charge_plan, read_row};
 use crate::base::records::{
     ItemFilter, Job, JobFilter, JobState, ListPage, ListRequest, Owned, Product, Receipt, Resource,
@@ -30,58 +30,43 @@ pub struct JobFacts {
 
 impl Service {
     /// The tenant's volume of that id.
-    ///
-    /// # Errors
-    /// If the database fails, or there is no memory for the row.
     pub async fn volume(
         &self,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Owned<StoredVolume>>, ServiceError> {
+    ) -> ServiceResult<Option<Owned<StoredVolume>>> {
         let catalogue = self.items().catalogue();
         read_row(|bytes| catalogue.volume_within(tenant, id, bytes)).await
     }
 
     /// The tenant's product of that id.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
     pub async fn product(
         &self,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Owned<Product>>, ServiceError> {
+    ) -> ServiceResult<Option<Owned<Product>>> {
         let catalogue = self.items().catalogue();
         read_row(|bytes| catalogue.product_within(tenant, id, bytes)).await
     }
 
     /// The tenant's job of that id.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
-    pub async fn job(&self, tenant: &Tenant, id: &str) -> Result<Option<Job>, ServiceError> {
+    pub async fn job(&self, tenant: &Tenant, id: &str) -> ServiceResult<Option<Job>> {
         let job = read_row(|bytes| self.queue.table().job_within(id, bytes)).await?;
         Ok(job.filter(|job| job.tenant == *tenant))
     }
 
     /// The job of that id as it is now, whoever it belongs to, for which nothing is charged: the caller holds its row.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn followed_job(&self, id: &str) -> StoreResult<Option<Job>> {
         self.queue.table().job(id).await
     }
 
     /// A page of the tenant's volumes, newest first.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
     pub async fn volumes(
         &self,
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Owned<StoredVolume>>, ServiceError> {
+    ) -> ServiceResult<ListPage<Owned<StoredVolume>>> {
         let catalogue = self.items().catalogue();
         let plan = catalogue.plan_items(tenant, Resource::Volume, filter, page);
         let page = charge_plan(page, plan.await?).await?;
@@ -89,16 +74,13 @@ impl Service {
     }
 
     /// A page of the tenant's products of that kind, newest first.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
     pub async fn products(
         &self,
         tenant: &Tenant,
         kind: Resource,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Owned<Product>>, ServiceError> {
+    ) -> ServiceResult<ListPage<Owned<Product>>> {
         let catalogue = self.items().catalogue();
         let plan = catalogue.plan_items(tenant, kind, filter, page);
         let page = charge_plan(page, plan.await?).await?;
@@ -106,24 +88,18 @@ impl Service {
     }
 
     /// A page of a tenant's jobs, newest first.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
     pub async fn jobs(
         &self,
         filter: &JobFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Job>, ServiceError> {
+    ) -> ServiceResult<ListPage<Job>> {
         let table = self.queue.table();
         let page = charge_plan(page, table.plan_jobs(filter, page).await?).await?;
         Ok(table.jobs(filter, page).await?)
     }
 
     /// What is known of these jobs beside their rows.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn job_facts(&self, jobs: &[Job]) -> Result<JobFacts, ServiceError> {
+    pub async fn job_facts(&self, jobs: &[Job]) -> ServiceResult<JobFacts> {
         let ids = |with: fn(&Job) -> bool| -> Vec<&str> {
             let those = jobs.iter().filter(|job| with(job));
             those.map(|job| job.id.as_str()).collect()
@@ -146,28 +122,18 @@ impl Service {
     }
 
     /// The tenant's receipt of that id.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
-    pub async fn receipt(
-        &self,
-        tenant: &Tenant,
-        id: &str,
-    ) -> Result<Option<Receipt>, ServiceError> {
+    pub async fn receipt(&self, tenant: &Tenant, id: &str) -> ServiceResult<Option<Receipt>> {
         let catalogue = self.items().catalogue();
         read_row(|bytes| catalogue.receipt_within(tenant, id, bytes)).await
     }
 
     /// A page of the tenant's receipts, newest first: all, or those of one item.
-    ///
-    /// # Errors
-    /// As [`Service::volume`].
     pub async fn receipts(
         &self,
         tenant: &Tenant,
         item: Option<&str>,
         page: ListRequest,
-    ) -> Result<ListPage<Receipt>, ServiceError> {
+    ) -> ServiceResult<ListPage<Receipt>> {
         let catalogue = self.items().catalogue();
         let plan = catalogue.plan_receipts(tenant, item, page).await?;
         let page = charge_plan(page, plan).await?;
@@ -175,39 +141,22 @@ impl Service {
     }
 
     /// A page of what other systems have sent to the tenant, newest first.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn received(
         &self,
         tenant: &Tenant,
         state: Option<GroupState>,
         page: ListRequest,
-    ) -> Result<ListPage<IntakeGroup>, ServiceError> {
+    ) -> ServiceResult<ListPage<IntakeGroup>> {
         Ok(self.intake.store.groups(tenant, state, page).await?)
     }
 
     /// Whose scan a volume of the tenant is; `None` if that was never known.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn scan(
-        &self,
-        tenant: &Tenant,
-        volume: &str,
-    ) -> Result<Option<ScanIdentity>, ServiceError> {
+    pub async fn scan(&self, tenant: &Tenant, volume: &str) -> ServiceResult<Option<ScanIdentity>> {
         Ok(self.items().catalogue().scan(tenant, volume).await?)
     }
 
     /// When the tenant's item or job with that id was erased; `None` if the tenant never had it.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn erased_at(
-        &self,
-        tenant: &Tenant,
-        id: &str,
-    ) -> Result<Option<Timestamp>, ServiceError> {
+    pub async fn erased_at(&self, tenant: &Tenant, id: &str) -> ServiceResult<Option<Timestamp>> {
         Ok(self.items().catalogue().erased_at(tenant, id).await?)
     }
 

@@ -2,7 +2,7 @@
 //!
 //! In: a product of a tenant. Out: the bytes, made under the budget of decoding; nothing of it is stored.
 
-use crate::base::error::{Refusal, ServiceError};
+use crate::base::error::{Refusal, ServiceError, ServiceResult};
 use crate::base::memory::charge;
 use crate::base::records::{Failure, Fault, Product, Tenant};
 use crate::items::OutputFile;
@@ -32,7 +32,7 @@ impl Service {
         stem: &str,
         part: Part,
         format: Format,
-    ) -> Result<Option<Option<OutputFile>>, ServiceError> {
+    ) -> ServiceResult<Option<Option<OutputFile>>> {
         let source = format!("{stem}.json");
         let Some(size) = product.file(&source).map(|file| file.bytes) else {
             return Ok(None);
@@ -58,7 +58,7 @@ impl Service {
         product: &Product,
         object: ResultObject,
         deidentify: bool,
-    ) -> Result<Option<OutputFile>, ServiceError> {
+    ) -> ServiceResult<Option<OutputFile>> {
         let sources = object.source_files(product);
         let sources = sources.iter().filter_map(|name| product.file(name));
         charge(sources.map(|file| file.bytes).sum()).await?;
@@ -89,7 +89,7 @@ impl Service {
         &self,
         product: &Product,
         scans: Vec<Map<String, Value>>,
-    ) -> Result<Option<String>, ServiceError> {
+    ) -> ServiceResult<Option<String>> {
         let work = self.engine.work(product.resource().noun());
         let Some(work) = work.filter(|work| !work.page_files().is_empty()) else {
             return Ok(None);

@@ -1,7 +1,9 @@
 //! The service: one method for each use case, whoever asks for it.
 //!
 //! HTTP, C-STORE, archive fetches, rules, work items and background tasks call the same methods, which check the
-//! same quotas and limits and return a [`ServiceError`](crate::base::error::ServiceError).
+//! same quotas and limits and return a [`ServiceError`](crate::base::error::ServiceError). Every one fails if the storage
+//! does, and if the request has no memory for what it reads; what else it refuses stands beside it. What an
+//! [`Agent`] changes belongs to the agent's tenant.
 //!
 //! | use case | where |
 //! |---|---|

@@ -1,8 +1,8 @@
 //! Stored volumes as they are looked at and looked after: previews, voxels, names, legal holds.
 
-use crate::base::error::{ServiceError, invalid_field};
+use crate::base::error::{ServiceError, ServiceResult, invalid_field};
 use crate::base::records::{
-    BlobError, FileRecord, LegalHold, LocalFile, StoreError, StoreFault, StoredVolume, Tags, Tenant,
+    BlobError, FileRecord, LegalHold, LocalFile, StoreError, StoreFault, StoredVolume, Tags,
 };
 use crate::callers::Agent;
 use crate::limits::decoding::LITTLE_MEMORY;
@@ -26,7 +26,7 @@ impl Service {
     ///
     /// # Errors
     /// If the storage fails, or too much waits to be read.
-    pub async fn preview(&self, volume: &StoredVolume) -> Result<Vec<u8>, ServiceError> {
+    pub async fn preview(&self, volume: &StoredVolume) -> ServiceResult<Vec<u8>> {
         let files = self.volume_files(volume).await?;
         let reader = self.engine.reader.clone();
         let memory = preview_memory(UploadFacts::from_volume(volume)?.shape);
@@ -43,7 +43,7 @@ impl Service {
         &self,
         volume: &StoredVolume,
         choice: VoxelChoice,
-    ) -> Result<Vec<u8>, ServiceError> {
+    ) -> ServiceResult<Vec<u8>> {
         let files = self.volume_files(volume).await?;
         let reader = self.engine.reader.clone();
         let memory = voxels_memory(UploadFacts::from_volume(volume)?.shape);
@@ -58,11 +58,7 @@ impl Service {
     ///
     /// # Errors
     /// If the storage fails, or too much waits to be read.
-    pub async fn is_bare(
-        &self,
-        volume: &StoredVolume,
-        file: &FileRecord,
-    ) -> Result<bool, ServiceError> {
+    pub async fn is_bare(&self, volume: &StoredVolume, file: &FileRecord) -> ServiceResult<bool> {
         if volume.files.len() > 1 {
             return Ok(false);
         }
@@ -77,18 +73,14 @@ impl Service {
 
     /// Replaces the tags of a tenant's item or job. `false` if there is none with that id, or its tags are not `before`
     /// any more.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn change_tags(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         id: &str,
         before: Tags,
         after: Tags,
-    ) -> Result<bool, ServiceError> {
-        let (items, tenant, id) = (self.items().clone(), tenant.clone(), id.to_owned());
+    ) -> ServiceResult<bool> {
+        let (items, tenant, id) = (self.items().clone(), by.tenant().clone(), id.to_owned());
         let change = async move {
             let catalogue = items.catalogue();
             catalogue.change_tags(&tenant, &id, &before, &after).await
@@ -96,7 +88,7 @@ impl Service {
         Ok(by.change::<_, StoreError>(change).await?)
     }
 
-    /// Puts a tenant's volume on legal hold from now on, for a caller of the name `holder`. `None` if it has no such
+    /// Puts a volume on legal hold from now on. `None` if it has no such
     /// volume.
     ///
     /// # Errors
@@ -104,41 +96,25 @@ impl Service {
     pub async fn hold_volume(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         id: &str,
-        holder: &str,
         reason: &str,
-    ) -> Result<Option<LegalHold>, ServiceError> {
+    ) -> ServiceResult<Option<LegalHold>> {
         let hold = LegalHold {
             reason: checked_reason(reason)?,
             since: self.now(),
-            by: holder.to_owned(),
+            by: by.name().to_owned(),
         };
-        let is_set = self.set_hold(by, tenant, id, Some(hold.clone())).await?;
+        let is_set = self.set_hold(by, id, Some(hold.clone())).await?;
         Ok(is_set.then_some(hold))
     }
 
     /// Lifts the legal hold of a tenant's volume, if there is one. `false` if it has no such volume.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn release_volume(
-        &self,
-        by: &Agent,
-        tenant: &Tenant,
-        id: &str,
-    ) -> Result<bool, ServiceError> {
-        self.set_hold(by, tenant, id, None).await
+    pub async fn release_volume(&self, by: &Agent, id: &str) -> ServiceResult<bool> {
+        self.set_hold(by, id, None).await
     }
 
-    async fn set_hold(
-        &self,
-        by: &Agent,
-        tenant: &Tenant,
-        id: &str,
-        hold: Option<LegalHold>,
-    ) -> Result<bool, ServiceError> {
-        let (items, tenant, id) = (self.items().clone(), tenant.clone(), id.to_owned());
+    async fn set_hold(&self, by: &Agent, id: &str, hold: Option<LegalHold>) -> ServiceResult<bool> {
+        let (items, tenant, id) = (self.items().clone(), by.tenant().clone(), id.to_owned());
         let set = async move {
             let catalogue = items.catalogue();
             catalogue.set_legal_hold(&tenant, &id, hold.as_ref()).await
@@ -147,7 +123,7 @@ impl Service {
     }
 
     /// The files of a stored volume, to be read.
-    async fn volume_files(&self, volume: &StoredVolume) -> Result<Vec<LocalFile>, ServiceError> {
+    async fn volume_files(&self, volume: &StoredVolume) -> ServiceResult<Vec<LocalFile>> {
         let (items, id) = (self.items(), &volume.id);
         if let Some(files) = items.volume_files(id, &volume.files).await? {
             return Ok(files);
@@ -158,7 +134,7 @@ impl Service {
     }
 }
 
-fn checked_reason(reason: &str) -> Result<String, ServiceError> {
+fn checked_reason(reason: &str) -> ServiceResult<String> {
     let text = reason.trim();
     let control = |c: char| !is_printable(c) && c != '\n';
     let most = LegalHold::REASON_LENGTH;

@@ -3,7 +3,7 @@
 //! In: a [`GivenWebhook`], none of which is checked. Out: a receiver that may be told, and its signing secret. What is
 //! sent, and when, is decided in [`crate::network::hooks`].
 
-use crate::base::error::{ServiceError, invalid_field as invalid, shorten};
+use crate::base::error::{ServiceResult, invalid_field as invalid, shorten};
 use crate::base::records::{Failure, Fault, JobWebhook, Tenant, Timestamp, random_id};
 use crate::callers::Agent;
 use crate::network::archive::ObjectDelivery;
@@ -72,14 +72,13 @@ impl Service {
     pub async fn register_webhook(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         given: GivenWebhook,
-    ) -> Result<(HookEndpoint, SigningSecret), ServiceError> {
+    ) -> ServiceResult<(HookEndpoint, SigningSecret)> {
         let checked = self.checked(given).await?;
         let secret = checked.secret.unwrap_or_else(SigningSecret::random);
         let endpoint = HookEndpoint {
             id: random_id("whk_"),
-            tenant: tenant.clone(),
+            tenant: by.tenant().clone(),
             created_at: self.now(),
             url: checked.url,
             destination: checked.destination,
@@ -100,74 +99,48 @@ impl Service {
     }
 
     /// The receivers of a tenant, the oldest first.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn webhooks(&self, tenant: &Tenant) -> Result<Vec<HookEndpoint>, ServiceError> {
+    pub async fn webhooks(&self, tenant: &Tenant) -> ServiceResult<Vec<HookEndpoint>> {
         Ok(self.hooks.store.endpoints(tenant).await?)
     }
 
     /// Removes a receiver, and gives up what it has not been told. `false` if the tenant has none with that id.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn remove_webhook(
-        &self,
-        by: &Agent,
-        tenant: &Tenant,
-        id: &str,
-    ) -> Result<bool, ServiceError> {
+    pub async fn remove_webhook(&self, by: &Agent, id: &str) -> ServiceResult<bool> {
         let (store, now) = (self.hooks.store.clone(), self.now());
-        let (tenant, id) = (tenant.clone(), id.to_owned());
+        let (tenant, id) = (by.tenant().clone(), id.to_owned());
         let remove = async move { store.remove_endpoint(&tenant, &id, now).await };
         Ok(by.change(remove).await?)
     }
 
     /// Makes a new signing secret for the tenant. Returns it, and until when the one before signs too.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn renew_signing_secret(
         &self,
         by: &Agent,
-        tenant: &Tenant,
-    ) -> Result<(SigningSecret, Timestamp), ServiceError> {
+    ) -> ServiceResult<(SigningSecret, Timestamp)> {
         let secret = SigningSecret::random();
         let until = self.now() + SECRET_OVERLAP.as_millis() as i64;
         let store = self.hooks.store.clone();
-        let (tenant, new) = (tenant.clone(), secret.clone());
+        let (tenant, new) = (by.tenant().clone(), secret.clone());
         by.change(async move { store.replace_secret(&tenant, &new, until).await })
             .await?;
         Ok((secret, until))
     }
 
     /// The messages about a tenant's job, the newest first, at most 100.
-    ///
-    /// # Errors
-    /// If the database fails.
-    pub async fn deliveries(
-        &self,
-        tenant: &Tenant,
-        job: &str,
-    ) -> Result<Vec<Delivery>, ServiceError> {
+    pub async fn deliveries(&self, tenant: &Tenant, job: &str) -> ServiceResult<Vec<Delivery>> {
         let found = self.hooks.store.deliveries(tenant, job, MOST_DELIVERIES);
         Ok(found.await?)
     }
 
     /// Sends a delivery of a job that has ended again, at once. `None` if the tenant's job has none with that id.
-    ///
-    /// # Errors
-    /// If the database fails.
     pub async fn redeliver(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         job: &str,
         id: &str,
-    ) -> Result<Option<Redelivered>, ServiceError> {
+    ) -> ServiceResult<Option<Redelivered>> {
         let now = self.now();
         let is_object = is_object_delivery(id);
-        let (tenant, job, id) = (tenant.clone(), job.to_owned(), id.to_owned());
+        let (tenant, job, id) = (by.tenant().clone(), job.to_owned(), id.to_owned());
         if is_object {
             let store = self.archives.store.clone();
             let again = async move { store.redeliver_object(&tenant, &job, &id, now).await };

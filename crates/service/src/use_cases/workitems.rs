@@ -4,7 +4,7 @@
 //! again if another change came before.
 
 use crate::base::dicom_tags::PROCEDURE_STEP_STATE;
-use crate::base::error::ServiceError;
+use crate::base::error::{ServiceError, ServiceResult};
 use crate::base::memory::{charge, end_rows, read_row};
 use crate::base::records::{Failure, Fault, Tenant, Timestamp};
 use crate::callers::Agent;
@@ -80,14 +80,13 @@ impl Service {
     pub async fn create_workitem(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         uid: &str,
         attributes: DataSetJson,
         counting: &Counting,
-    ) -> Result<CreatedWorkitem, ServiceError> {
+    ) -> ServiceResult<CreatedWorkitem> {
         counting.arrived(stored_bytes(&attributes)? as u64).await?;
         let now = self.now();
-        let made = Workitem::create(tenant, uid, attributes, (now, &dicom_time(now)));
+        let made = Workitem::create(by.tenant(), uid, attributes, (now, &dicom_time(now)));
         let (item, completed) = match made {
             Ok(made) => made,
             Err(refusal) => return Ok(CreatedWorkitem::Refused(refusal)),
@@ -102,14 +101,7 @@ impl Service {
     }
 
     /// The tenant's work item of that UID.
-    ///
-    /// # Errors
-    /// If the database fails, or there is no memory for the row.
-    pub async fn workitem(
-        &self,
-        tenant: &Tenant,
-        uid: &str,
-    ) -> Result<Option<Workitem>, ServiceError> {
+    pub async fn workitem(&self, tenant: &Tenant, uid: &str) -> ServiceResult<Option<Workitem>> {
         read_row(|bytes| self.worklist.workitem_within(tenant, uid, bytes)).await
     }
 
@@ -120,18 +112,17 @@ impl Service {
     pub async fn update_workitem(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         uid: &str,
         transaction: Option<&str>,
         changes: &DataSetJson,
         counting: &Counting,
-    ) -> Result<ChangedWorkitem, ServiceError> {
+    ) -> ServiceResult<ChangedWorkitem> {
         counting.arrived(stored_bytes(changes)? as u64).await?;
         let update = |item: &mut Workitem, now: (Timestamp, &str)| {
             item.update(transaction, changes.clone(), now)?;
             Ok(Change::Done)
         };
-        let changed = self.change_workitem(by, tenant, uid, update).await?;
+        let changed = self.change_workitem(by, uid, update).await?;
         if matches!(changed, ChangedWorkitem::Done(_)) {
             // It may be ready now.
             self.scheduled.notify_one();
@@ -146,13 +137,12 @@ impl Service {
     pub async fn change_workitem(
         &self,
         by: &Agent,
-        tenant: &Tenant,
         uid: &str,
         how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
-    ) -> Result<ChangedWorkitem, ServiceError> {
+    ) -> ServiceResult<ChangedWorkitem> {
         for tried in 0..CHANGE_TRIES {
             tokio::time::sleep(CHANGE_PAUSE * tried).await;
-            let Some(mut item) = self.workitem(tenant, uid).await? else {
+            let Some(mut item) = self.workitem(by.tenant(), uid).await? else {
                 return Ok(ChangedWorkitem::Unknown);
             };
             let now = self.now();
@@ -189,7 +179,7 @@ impl Service {
         matching: &Matching,
         mut skip: usize,
         limit: usize,
-    ) -> Result<FoundWorkitems, ServiceError> {
+    ) -> ServiceResult<FoundWorkitems> {
         charge(SEARCH_MEMORY).await?;
         let state = matching
             .wanted(PROCEDURE_STEP_STATE)
@@ -236,7 +226,7 @@ impl Service {
         &self,
         matching: &Matching,
         items: Vec<Workitem>,
-    ) -> Result<Vec<Workitem>, ServiceError> {
+    ) -> ServiceResult<Vec<Workitem>> {
         let is_match = |item: &Workitem, matching: &Matching| matching.matches(item.shown());
         if !matching.has_patterns() {
             let matched = items.into_iter().filter(|item| is_match(item, matching));
@@ -253,7 +243,7 @@ impl Service {
 }
 
 /// The length of an item's attributes as they are stored, bytes.
-fn stored_bytes(attributes: &DataSetJson) -> Result<usize, ServiceError> {
+fn stored_bytes(attributes: &DataSetJson) -> ServiceResult<usize> {
     let text = serde_json::to_string(attributes.object());
     Ok(text.map_err(ServiceError::internal)?.len())
 }
