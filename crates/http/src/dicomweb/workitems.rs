@@ -29,11 +29,9 @@ use ventriform_service::base::dicom_tags::{
 };
 use ventriform_service::base::records::{Erased, Timestamp};
 use ventriform_service::network::worklist::{
-    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, new_uid,
+    Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, new_uid,
 };
-use ventriform_service::use_cases::workitems::{
-    ChangedWorkitem, CreatedWorkitem, FoundWorkitems, MAX_WORKITEMS,
-};
+use ventriform_service::use_cases::workitems::{ChangedWorkitem, FoundWorkitems};
 
 const MEDIA_TYPE: &str = "application/dicom+json";
 
@@ -91,29 +89,7 @@ pub async fn create_workitem(
     require_uid(field, &uid)?;
     let service = &app.service;
     let created = service.create_workitem(&caller.by, &uid, attributes, &counting);
-    let (added, completed) = match created.await? {
-        CreatedWorkitem::Stored { added, completed } => (added, completed),
-        CreatedWorkitem::Refused(refusal) => return Err(refused(refusal)),
-    };
-    match added {
-        AddedWorkitem::Done => {}
-        AddedWorkitem::Exists => {
-            return Err(Problem::new(
-                StatusCode::CONFLICT,
-                "workitem-exists",
-                "There is a work item of this UID.",
-            )
-            .fix("Give another UID, or none: then the service makes one."));
-        }
-        AddedWorkitem::Full => {
-            return Err(Problem::new(
-                StatusCode::INSUFFICIENT_STORAGE,
-                "too-many-workitems",
-                format!("There are {MAX_WORKITEMS} work items."),
-            )
-            .fix("Set `job_retention`, so that ended items are deleted."));
-        }
-    }
+    let completed = created.await?.map_err(refused)?;
     let location = [(header::LOCATION, path(&uid))];
     let warning = completed.then(|| {
         let text = "The Workitem was created with modifications.";

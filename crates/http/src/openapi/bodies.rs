@@ -138,7 +138,7 @@ schemas! {
                 .schema_type(Type::String)
                 .enum_values(Some([only]))
         };
-        let mesh = ObjectBuilder::new()
+        ObjectBuilder::new()
             .property("frame", word("LPS"))
             .property("unit", word("mm"))
             .property("title", text("What the mesh shows"))
@@ -196,8 +196,7 @@ schemas! {
                 ),
             )
             .required("vertices")
-            .required("triangles");
-        mesh
+            .required("triangles")
     };
 }
 
@@ -363,6 +362,7 @@ impl PartialSchema for NormalsJobParameters {
     fn schema() -> RefOr<Schema> {
         let mut object = joined([NormalsParameters::schema(), CohortFields::schema()]);
         object.properties.remove("parameters");
+        object.description = Some("The parameters of normal limits".into());
         Schema::Object(object).into()
     }
 }

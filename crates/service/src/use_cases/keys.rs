@@ -27,14 +27,6 @@ pub struct KeyOrder {
     pub quota: Quota,
 }
 
-/// When a key ends that a caller makes.
-struct Ends {
-    /// If it does not ask.
-    unasked: Option<Timestamp>,
-    /// At the latest.
-    last: Option<Timestamp>,
-}
-
 impl Service {
     /// Makes a key for the tenant of `maker`. Returns its record and the text that its owner presents.
     ///
@@ -99,12 +91,12 @@ impl Service {
             // It could make one more.
             return Err(beyond("scope", Scope::Submit));
         }
-        let ends = self.ends(maker, now);
-        let expires_at = match (order.expires_at, ends.last) {
+        let last = self.last_end(maker, now);
+        let expires_at = match (order.expires_at, last) {
             (Some(asked), Some(last)) if asked > last => {
                 return Err(beyond("expires_at", rfc3339(last)));
             }
-            (asked, _) => asked.or(ends.unasked),
+            (asked, _) => asked.or(maker.expires_at),
         };
         // What the maker has itself, and what the operator allows everybody.
         let (own, allowed) = (maker.quota, maker.limits(self.quotas.general));
@@ -134,16 +126,16 @@ impl Service {
         })
     }
 
-    fn ends(&self, maker: &Identity, now: Timestamp) -> Ends {
-        let unasked = maker.expires_at;
+    /// When a key of `maker` ends at the latest.
+    fn last_end(&self, maker: &Identity, now: Timestamp) -> Option<Timestamp> {
+        let end = maker.expires_at?;
         let is_token = maker.key.is_none() && maker.owner.is_some();
-        let life = self.settings.oidc_key_life.0;
-        let life = Timestamp::try_from(life.as_millis()).unwrap_or(Timestamp::MAX);
-        let asked = is_token.then(|| now.saturating_add(life));
-        Ends {
-            unasked,
-            last: unasked.map(|end| asked.map_or(end, |asked| asked.max(end))),
+        if !is_token {
+            return Some(end);
         }
+        let life = self.settings.oidc_key_life.0.as_millis();
+        let life = Timestamp::try_from(life).unwrap_or(Timestamp::MAX);
+        Some(end.max(now.saturating_add(life)))
     }
 }
 

@@ -4,7 +4,7 @@
 //! again if another change came before.
 
 use crate::base::dicom_tags::PROCEDURE_STEP_STATE;
-use crate::base::error::{ServiceError, ServiceResult};
+use crate::base::error::{self, ServiceError, ServiceResult};
 use crate::base::memory::{charge, end_rows, read_row};
 use crate::base::records::{Failure, Fault, Tenant, Timestamp};
 use crate::callers::Agent;
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use ventriform::base::progress::{Monitor, Stage};
 
 /// Most items of a tenant.
-pub const MAX_WORKITEMS: u64 = 100_000;
+const MAX_WORKITEMS: u64 = 100_000;
 
 /// Items read from the table at a time.
 const BATCH_ITEMS: u32 = 200;
@@ -38,19 +38,6 @@ const CHANGE_TRIES: u32 = 20;
 /// Pause before the second try of a change; it grows by as much with each further one, so that the tries
 /// of many requests spread.
 const CHANGE_PAUSE: Duration = Duration::from_millis(2);
-
-/// A new work item: whether it is stored, and whether absent attributes were completed.
-pub enum CreatedWorkitem {
-    /// What came of storing it.
-    Stored {
-        /// Whether it was added.
-        added: AddedWorkitem,
-        /// Whether absent attributes got neutral values.
-        completed: bool,
-    },
-    /// Its attributes cannot be used.
-    Refused(Refusal),
-}
 
 /// What came of a change.
 pub enum ChangedWorkitem {
@@ -73,31 +60,32 @@ pub struct FoundWorkitems {
 }
 
 impl Service {
-    /// Adds a work item of the tenant.
+    /// Adds a work item. Returns whether absent attributes got neutral values, or why the attributes cannot be used.
     ///
     /// # Errors
-    /// If the tenant's quota is full, or the database fails.
+    /// `workitem-exists`; `too-many-workitems`; `storage-quota`.
     pub async fn create_workitem(
         &self,
         by: &Agent,
         uid: &str,
         attributes: DataSetJson,
         counting: &Counting,
-    ) -> ServiceResult<CreatedWorkitem> {
+    ) -> ServiceResult<Result<bool, Refusal>> {
         counting.arrived(stored_bytes(&attributes)? as u64).await?;
         let now = self.now();
         let made = Workitem::create(by.tenant(), uid, attributes, (now, &dicom_time(now)));
         let (item, completed) = match made {
             Ok(made) => made,
-            Err(refusal) => return Ok(CreatedWorkitem::Refused(refusal)),
+            Err(refusal) => return Ok(Err(refusal)),
         };
         let worklist = self.worklist.clone();
         let add = async move { worklist.add_workitem(&item, MAX_WORKITEMS).await };
-        let added = by.change(add).await?;
-        if added == AddedWorkitem::Done {
-            self.scheduled.notify_one();
+        match by.change(add).await? {
+            AddedWorkitem::Done => self.scheduled.notify_one(),
+            AddedWorkitem::Exists => return Err(exists()),
+            AddedWorkitem::Full => return Err(too_many()),
         }
-        Ok(CreatedWorkitem::Stored { added, completed })
+        Ok(Ok(completed))
     }
 
     /// The tenant's work item of that UID.
@@ -246,6 +234,20 @@ impl Service {
 fn stored_bytes(attributes: &DataSetJson) -> ServiceResult<usize> {
     let text = serde_json::to_string(attributes.object());
     Ok(text.map_err(ServiceError::internal)?.len())
+}
+
+fn exists() -> ServiceError {
+    let detail = "There is a work item of this UID.";
+    let fix = "Give another UID, or none: then the service makes one.";
+    let failure = Failure::new(Fault::Request, "workitem-exists", detail).fix(fix);
+    ServiceError::new(error::Refusal::Conflict, failure)
+}
+
+fn too_many() -> ServiceError {
+    let detail = format!("There are {MAX_WORKITEMS} work items.");
+    let fix = "Set `job_retention`, so that ended items are deleted.";
+    let failure = Failure::new(Fault::Request, "too-many-workitems", detail).fix(fix);
+    ServiceError::new(error::Refusal::NoRoom, failure)
 }
 
 /// PS3.18, table 8.3.4-1.
