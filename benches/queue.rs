@@ -14,8 +14,8 @@ use tokio::time::{MissedTickBehavior, interval, sleep};
 use ventriform::base::progress::{Monitor, Plan};
 use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::{PhantomParameters, ReadLimits, phantom};
-use ventriform_http::{Running, install_cryptography};
-use ventriform_program::server::start;
+use ventriform_http::install_cryptography;
+use ventriform_program::server::{Running, start};
 use ventriform_service::base::records::{
     Claimant, Clock, Failure, JobFilter, JobOutcome, JobState, JobStore, Lease, ListRequest,
     NewJob, Resource, SystemClock, random_id,

@@ -6,8 +6,7 @@ use std::time::Duration;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use ventriform::image::volume::ReadLimits;
-use ventriform_http::Running;
-use ventriform_program::server::start;
+use ventriform_program::server::{Running, start};
 use ventriform_service::config::Settings;
 use ventriform_service::work::Engine;
 

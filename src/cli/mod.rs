@@ -1,5 +1,6 @@
 //! The `ventriform` command: arguments in, exit status out.
 
+pub mod advice;
 mod audit;
 mod bar;
 mod beat;
@@ -146,7 +147,7 @@ pub fn main() -> ExitCode {
     match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            note!("error: {}", help::failure(&format!("{error:#}")));
+            note!("error: {}", help::failure(&advice::advised(&error)));
             if error.is::<UnusableArgument>() {
                 ExitCode::from(USAGE_STATUS)
             } else {

@@ -2,7 +2,7 @@
 
 use super::log;
 use super::output::say;
-use crate::server;
+use crate::server::{self, Running};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::net::{SocketAddr, TcpListener};
@@ -10,7 +10,6 @@ use std::path::Path;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use ventriform::image::volume::ReadLimits;
-use ventriform_http::Running;
 use ventriform_service::config::{Flags, Settings};
 use ventriform_service::jobs::{Isolation, serve_isolated};
 use ventriform_service::work::Engine;

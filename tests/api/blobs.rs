@@ -15,9 +15,9 @@ use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform_service::base::records::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Cutoff, Erased, ErasureAgent, ErasureOrder,
-    ErasureReason, FileRecord, Filed, ItemRecord, JobState, LocalFile, NewJob, Resource, Shelved,
-    StagedFiles, StagedFor, StoredVolume, SystemClock, Tags, Tenant, Timestamp,
+    BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Cutoff, Erased, ErasureAgent,
+    ErasureOrder, ErasureReason, FileRecord, Filed, ItemRecord, JobState, LocalFile, NewJob,
+    Resource, Shelved, StagedFiles, StagedFor, StoredVolume, SystemClock, Tags, Tenant, Timestamp,
 };
 use ventriform_service::items::{Custodian, Items};
 use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
@@ -259,11 +259,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let job = job.unwrap();
     assert_eq!(job.state, JobState::Succeeded, "{:?}", job.failure);
 
-    let model = queue
-        .items()
-        .catalogue()
-        .product(&tenant, &job.result.unwrap())
-        .await;
+    let model = store.rows.product(&tenant, &job.result.unwrap()).await;
     let model = model.unwrap().unwrap().item;
     let report = model.file("report.json").unwrap();
     let content = blobs

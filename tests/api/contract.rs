@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 use ventriform::image::volume::dicom::DicomHeader;
+use ventriform_program::cli::advice::advised;
 use ventriform_service::base::records::{
     AddedProduct, Bounded, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased,
     ErasureAgent, ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed,
@@ -2951,16 +2952,14 @@ async fn a_folder_and_a_database_that_do_not_belong_together_are_refused() {
     std::fs::create_dir_all(folder.path().join("volumes/vol_1")).unwrap();
     let error = on(Some(&wrong)).await.err().unwrap().to_string();
     assert!(error.contains("is empty"), "{error}");
-    let error = on(None).await.err().unwrap().to_string();
+    let error = advised(&on(None).await.err().unwrap().into());
     assert!(error.contains("--database"), "{error}");
-    let error = ventriform_store::examine(folder.path(), None, None)
-        .await
-        .unwrap_err()
-        .to_string();
+    let error = ventriform_store::examine(folder.path(), None, None).await;
+    let error = advised(&error.unwrap_err().into());
     assert!(error.contains("pg_dump"), "{error}");
     std::fs::remove_file(folder.path().join("database")).unwrap();
     std::fs::write(folder.path().join("ventriform.db"), "").unwrap();
-    let error = on(Some(&url)).await.err().unwrap().to_string();
+    let error = advised(&on(Some(&url)).await.err().unwrap().into());
     assert!(error.contains("Start without --database"), "{error}");
 }
 

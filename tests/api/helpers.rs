@@ -21,8 +21,8 @@ use ventriform::mesh::TriMesh;
 use ventriform::mesh::files::MeshStatement;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::results::export::{self, Format, Metadata};
-use ventriform_http::{Running, document_json, install_cryptography};
-use ventriform_program::server::start;
+use ventriform_http::{document_json, install_cryptography};
+use ventriform_program::server::{Running, start};
 use ventriform_service::base::records::{
     Clock, Cutoff, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock, Timestamp,
     TrustedNow,

@@ -17,11 +17,10 @@ use std::time::{Duration, Instant};
 use ventriform::base::geometry::Vec3;
 use ventriform::base::geometry::frame::VoxelToPatient;
 use ventriform::image::volume::{ReadLimits, Volume};
-use ventriform_http::ServeError;
-use ventriform_program::server::start;
+use ventriform_program::server::{ServeError, start};
 use ventriform_service::callers::{AccessStore, Quota, Scope};
 use ventriform_service::config::Settings;
-use ventriform_service::run::start::OpenError;
+use ventriform_service::run::start::StartError;
 use ventriform_service::work::Engine;
 
 const EVENT_PATIENCE: Duration = Duration::from_secs(20);
@@ -604,7 +603,10 @@ async fn strangers_cannot_send_from_other_machines_unless_told_so() {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         start(settings(change), engine(), listener).await
     };
-    assert!(matches!(begin(|_| {}).await, Err(ServeError::OpenDicom(_))));
+    assert!(matches!(
+        begin(|_| {}).await,
+        Err(ServeError::Start(StartError::OpenDicom(_)))
+    ));
     let open = begin(|settings| settings.allow_anonymous = true).await;
     open.unwrap().stop().await.unwrap();
     let listed = begin(|settings| settings.senders = r#"[{ ae_title = "A" }]"#.parse().unwrap());
@@ -614,7 +616,7 @@ async fn strangers_cannot_send_from_other_machines_unless_told_so() {
         settings.rules = r#"[{ kind = "cup" }]"#.parse().unwrap();
     });
     assert!(
-        matches!(rules.await, Err(ServeError::Open(OpenError::Rules(why))) if why.contains("rule 1"))
+        matches!(rules.await, Err(ServeError::Start(StartError::Rules(why))) if why.contains("rule 1"))
     );
     let to = begin(|settings| {
         settings.dicom_listen = "off".parse().unwrap();
@@ -622,7 +624,7 @@ async fn strangers_cannot_send_from_other_machines_unless_told_so() {
         settings.rules = rule.parse().unwrap();
     });
     assert!(
-        matches!(to.await, Err(ServeError::Open(OpenError::Rules(why))) if why.contains("pacs"))
+        matches!(to.await, Err(ServeError::Start(StartError::Rules(why))) if why.contains("pacs"))
     );
 }
 

@@ -10,6 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tempfile::TempDir;
+use ventriform_program::cli::advice::advised;
 use ventriform_service::base::records::{Clock, Resource, SystemClock, Tenant, random_id};
 use ventriform_service::callers::{AccessStore, Activity, AuditEvent, Quota, Scope, verify};
 use ventriform_service::config::{AwsVariables, PostgresSettings, Settings};
@@ -432,7 +433,8 @@ async fn a_bucket_that_was_moved_is_noted_if_it_has_all_files() {
             ..StoreSettings::default()
         };
         let refused = Store::open_with(data.path(), settings).await.err().unwrap();
-        assert!(refused.to_string().contains("--moved-files"), "{refused}");
+        let said = advised(&refused.into());
+        assert!(said.contains("--moved-files"), "{said}");
     }
 }
 
@@ -488,5 +490,6 @@ async fn a_folder_of_files_that_was_moved_is_noted_if_it_is_of_no_other_database
         ..StoreSettings::default()
     };
     let refused = Store::open_with(old.path(), settings).await.err().unwrap();
-    assert!(refused.to_string().contains("--moved-files"), "{refused}");
+    let said = advised(&refused.into());
+    assert!(said.contains("--moved-files"), "{said}");
 }

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
+use ventriform_program::cli::advice::advised;
 use ventriform_service::base::records::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
     StoredVolume, random_id,
@@ -536,8 +537,9 @@ async fn a_bucket_that_cannot_be_used_is_refused_at_the_start_with_what_to_do() 
         };
         Store::open_with(folder, settings).await
     };
-    let refused =
-        async |folder: &Path, location| open(folder, location).await.err().unwrap().to_string();
+    let refused = async |folder: &Path, location| {
+        advised(&open(folder, location).await.err().unwrap().into())
+    };
     let no_bucket = S3Location {
         bucket: "nothing".into(),
         ..server.location(&prefix)

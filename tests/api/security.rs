@@ -16,14 +16,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-use ventriform_http::ServeError;
-use ventriform_program::server::start;
+use ventriform_program::server::{ServeError, start};
 use ventriform_service::base::records::{Clock, StoreError, SystemClock, Tenant, rfc3339};
 use ventriform_service::callers::{
     AccessStore, Activity, Agent, AuditEvent, BrokenLink, Quota, Recorder, Scope, verify,
 };
 use ventriform_service::config::Settings;
 use ventriform_service::network::hooks::{DeliveryStore, SigningSecret};
+use ventriform_service::run::start::StartError;
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
@@ -256,7 +256,7 @@ async fn beyond_loopback_nobody_is_served_without_credentials() {
     };
     let everywhere = || TcpListener::bind("0.0.0.0:0").unwrap();
     let refused = start(settings(false), fake_engine(), everywhere()).await;
-    let Err(ServeError::OpenHttp(_)) = refused.map(|_| ()) else {
+    let Err(ServeError::Start(StartError::OpenHttp(_))) = refused.map(|_| ()) else {
         panic!("it must not start");
     };
     let open = start(settings(true), fake_engine(), everywhere())

@@ -6,6 +6,7 @@ use serde_json::json;
 use sqlx::ConnectOptions;
 use sqlx::sqlite::SqliteConnectOptions;
 use std::time::Duration;
+use ventriform_program::cli::advice::advised;
 use ventriform_store::Store;
 
 /// More than any disk has.
@@ -138,7 +139,7 @@ async fn without_its_database_a_folder_with_items_is_refused_and_left_alone() {
         let Err(refusal) = Store::open(data.path()).await else {
             panic!("it started");
         };
-        let said = refusal.to_string();
+        let said = advised(&refusal.into());
         assert!(
             said.contains("doctor") && said.contains("ventriform.db"),
             "{said}"

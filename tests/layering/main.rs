@@ -5,6 +5,7 @@ mod ages;
 mod changes;
 mod imports;
 mod page;
+mod tables;
 
 use imports::{ModulePath, Sources, circles, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
@@ -118,10 +119,17 @@ const SERVICE_ROOMS: &[&str] = &[
     "telemetry",
     "work",
     "use_cases/service",
-    "use_cases/series",
-    "use_cases/filing",
+    "use_cases/keys",
+    "use_cases/webhooks",
+    "use_cases/workitems",
+    "use_cases/operation",
+    "use_cases/reading",
+    "use_cases/volumes",
+    "use_cases/results",
     "use_cases/erasures",
     "use_cases/scans",
+    "use_cases/series",
+    "use_cases/filing",
     "use_cases/uploads",
     "use_cases/library",
     "use_cases/pairs",

@@ -30,13 +30,17 @@ pub struct Shared {
 impl App {
     /// The state of handlers that have answered nothing yet.
     pub fn new(service: Arc<Service>, guard: Guard) -> Self {
-        let memory = service.settings.answer_memory.0;
+        let settings = service.settings();
+        let memory = settings.answer_memory.0;
         let answer_memory = usize::try_from(memory).unwrap_or(usize::MAX);
         Self(Arc::new(Shared {
             guard,
             answers: ResponseCache::new(answer_memory / 2),
             products: ResponseCache::new(answer_memory / 2),
-            streams: EventStreams::new(&service.settings),
+            streams: EventStreams::new(
+                settings.event_stream_limit,
+                settings.client_event_stream_limit,
+            ),
             service,
         }))
     }

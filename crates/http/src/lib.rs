@@ -28,7 +28,7 @@ pub mod edge;
 mod openapi;
 mod resources;
 mod router;
-mod server;
+mod serve;
 mod wire;
 
 use serde::Serialize;
@@ -36,9 +36,9 @@ use serde_json::Serializer;
 use serde_json::ser::PrettyFormatter;
 
 pub use app::App;
-pub use edge::connections::tls::TlsError;
+pub use edge::connections::tls::{Tls, TlsError};
 pub use edge::cryptography::install_cryptography;
-pub use server::{Running, ServeError, start};
+pub use serve::serve;
 
 /// The OpenAPI document, as committed under `openapi/`: a line for each value, so that changes can be read.
 ///

@@ -177,12 +177,12 @@ fn operations() -> OpenApiRouter<App> {
 
 /// The whole service, or what a worker serves of it.
 pub fn router(app: App) -> Router {
-    let api = if app.service.settings.role.serves() {
-        public(&app.service.settings)
+    let api = if app.service.settings().role.serves() {
+        public(app.service.settings())
     } else {
         operations().split_for_parts().0
     };
-    let tls = app.service.settings.tls_cert.0.is_some();
+    let tls = app.service.settings().tls_cert.0.is_some();
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()
         .layer(SetSensitiveRequestHeadersLayer::new([
@@ -220,7 +220,7 @@ pub fn router(app: App) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         .layer(middleware::from_fn_with_state(app.clone(), guard::guard));
     // Browsers send preflights without credentials, so this stands before the guard.
-    let api = match pages::cors(&app.service.settings) {
+    let api = match pages::cors(app.service.settings()) {
         Some(cors) => api.layer(cors),
         None => api,
     };

@@ -125,15 +125,11 @@ pub struct Store {
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// Another process uses it.
-    #[error(
-        "{0} is in use by another ventriform process; stop that process or choose another data folder"
-    )]
+    #[error("{0} is in use by another ventriform process")]
     InUse(PathBuf),
     /// It holds items, but its database is missing or empty.
     #[error(
-        "{folder} holds stored items, but {database} is missing or empty. Restore it from a backup \
-         together with its -wal file, or make a new one from what lies beside the files: \
-         ventriform doctor --data-dir {folder} --repair",
+        "{folder} holds stored items, but {database} is missing or empty",
         folder = .0.display(),
         database = .0.join(DATABASE_FILE).display(),
     )]
@@ -142,18 +138,12 @@ pub enum OpenError {
     /// database are missing.
     #[error(
         "{folder}: the service did not stop in order, and {DATABASE_FILE}-wal, which holds the last \
-         changes to the database, is missing. Restore it together with {DATABASE_FILE}; if it is \
-         lost, accept that and check the rest: ventriform doctor --data-dir {folder} --repair",
+         changes to the database, is missing",
         folder = .0.display(),
     )]
     LogMissing(PathBuf),
     /// Its files are in a bucket, and another place was given.
-    #[error(
-        "the files of {folder} are in {blobs}: start the service with `--blobs {blobs}`, or on another \
-         folder. If they were moved to another bucket, note it: ventriform migrate --moved-files \
-         s3://BUCKET/PREFIX --data-dir {folder}. Commands that work on the files of a folder cannot be used on it",
-        folder = .folder.display(),
-    )]
+    #[error("the files of {folder} are in {blobs}", folder = .folder.display())]
     FilesElsewhere {
         /// The folder.
         folder: PathBuf,
@@ -162,8 +152,7 @@ pub enum OpenError {
     },
     /// It holds the files of items, and a bucket was given.
     #[error(
-        "{folder} holds the files of stored items, so they cannot be in {blobs}: start the service \
-         without `--blobs`, or on another folder",
+        "{folder} holds the files of stored items, so they cannot be in {blobs}",
         folder = .folder.display(),
     )]
     FilesHere {
@@ -174,8 +163,7 @@ pub enum OpenError {
     },
     /// The bucket holds items, but the database is missing or empty.
     #[error(
-        "{blobs} holds stored items, but {database} is missing or empty. Restore it from a backup, or \
-         give another bucket or prefix",
+        "{blobs} holds stored items, but {database} is missing or empty",
         database = .database.display(),
     )]
     RowsMissing {
@@ -191,10 +179,7 @@ pub enum OpenError {
     #[error(transparent)]
     Blobs(#[from] BlobError),
     /// It holds items, but the database on the server has never held any.
-    #[error(
-        "{folder} holds stored items, but {url} is empty. Give the database that belongs to the folder, \
-         or another folder (data_dir)", folder = .folder.display(),
-    )]
+    #[error("{folder} holds stored items, but {url} is empty", folder = .folder.display())]
     DatabaseEmpty {
         /// The folder.
         folder: PathBuf,
@@ -202,11 +187,7 @@ pub enum OpenError {
         url: PostgresUrl,
     },
     /// The files of the records in the database are elsewhere.
-    #[error(
-        "the files of the records in {url} are in {place}, not in {own}. Give every process on a database \
-         the same `blobs`; a database whose files are in a folder is used with that folder alone. If the \
-         files were moved, note it: ventriform migrate --moved-files {own} --database {url}"
-    )]
+    #[error("the files of the records in {url} are in {place}, not in {own}")]
     OtherFiles {
         /// The database.
         url: PostgresUrl,
@@ -216,17 +197,14 @@ pub enum OpenError {
         own: String,
     },
     /// Its records are in a database on a server.
-    #[error(
-        "the records of {folder} are kept in {url}. Give that database by --database or \
-         VENTRIFORM_DATABASE; it is checked and copied by the tools of PostgreSQL, such as pg_dump. If \
-         the folder does not belong to it any more, delete {marker}",
-        folder = .folder.display(), marker = .folder.join(MARKER_FILE).display(),
-    )]
+    #[error("the records of {folder} are kept in {url}", folder = .folder.display())]
     OnServer {
         /// The folder.
         folder: PathBuf,
         /// Where its records are.
         url: String,
+        /// The file of the folder that says so.
+        marker: PathBuf,
     },
     /// There is no store where one is to be found.
     #[error("{place} {reason}")]
@@ -237,10 +215,7 @@ pub enum OpenError {
         reason: &'static str,
     },
     /// A migration to it was begun and did not end.
-    #[error(
-        "{place} is the target of a {note}, which has not ended: give the same `ventriform migrate` again, \
-         which goes on where it stopped"
-    )]
+    #[error("{place} is the target of a {note}, which has not ended")]
     Unfinished {
         /// The folder or the database.
         place: String,
@@ -248,10 +223,7 @@ pub enum OpenError {
         note: String,
     },
     /// Its records are in a file.
-    #[error(
-        "the records of {folder} are kept in its file {DATABASE_FILE}. Start without --database, or give \
-         another folder (data_dir)", folder = .0.display(),
-    )]
+    #[error("the records of {folder} are kept in its file {DATABASE_FILE}", folder = .0.display())]
     InFile(PathBuf),
     /// The database on the server cannot be used.
     #[error(transparent)]
@@ -445,6 +417,7 @@ fn require_file(folder: &Path) -> Result<(), OpenError> {
         Ok(url) => Err(OpenError::OnServer {
             folder: folder.to_owned(),
             url: url.lines().next().unwrap_or_default().to_owned(),
+            marker: folder.join(MARKER_FILE),
         }),
         Err(_) => Ok(()),
     }

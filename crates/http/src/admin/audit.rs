@@ -5,13 +5,12 @@ use crate::edge::caller::Caller;
 use crate::openapi::ListProblems;
 use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::Answer;
-use crate::wire::query::{Query, moment};
+use crate::wire::query::{Moment, Query};
 use axum::Json;
 use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::base::records::Timestamp;
 use ventriform_service::callers::{AuditFilter, fhir};
 
 /// A page of the audit trail.
@@ -34,13 +33,11 @@ pub struct AuditQuery {
     /// Only what concerns the item with this id
     object: Option<String>,
     /// Only from this time on (RFC 3339)
-    #[serde(default, deserialize_with = "moment")]
     #[param(value_type = Option<String>)]
-    since: Option<Timestamp>,
+    since: Option<Moment>,
     /// Only before this time (RFC 3339)
-    #[serde(default, deserialize_with = "moment")]
     #[param(value_type = Option<String>)]
-    until: Option<Timestamp>,
+    until: Option<Moment>,
 }
 
 /// Read the audit trail
@@ -60,12 +57,10 @@ pub async fn list_audit_events(
         tenant: Some(caller.tenant),
         agent: search.agent,
         object: search.object,
-        since: search.since,
-        until: search.until,
+        since: search.since.map(|moment| moment.0),
+        until: search.until.map(|moment| moment.0),
     };
-    // What was noted within the last second belongs to the answer.
-    app.service.recorder.flush().await;
-    let page = app.service.access.audit(&filter, page).await?;
+    let page = app.service.audit_trail(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let events = page.items.iter().map(fhir).collect();
     Ok(Json(AuditPage {

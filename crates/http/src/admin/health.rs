@@ -10,8 +10,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::telemetry::MetricReadings;
-use ventriform_service::telemetry::{Check, why_unready};
+use ventriform_service::telemetry::Check;
 
 /// The state of the service.
 #[derive(Serialize, ToSchema)]
@@ -101,15 +100,9 @@ pub async fn alive(_: NoQuery) -> Answer<Json<Health>> {
             content_type = "application/problem+json"),
         ListProblems))]
 pub async fn ready(State(app): State<App>, _: NoQuery) -> Answer {
-    let found = app
-        .service
-        .readiness
-        .check(app.service.dependencies())
-        .await;
+    let (found, why) = app.service.readiness().await;
     let checks = found.iter().map(Dependency::from).collect();
-    let closing = app.service.closing.is_cancelled();
-    let why = closing.then_some("The service is shutting down.");
-    if let Some(why) = why.or_else(|| why_unready(&found)) {
+    if let Some(why) = why {
         return Ok(unready(why, checks));
     }
     let Health { status, version } = healthy();
@@ -136,23 +129,7 @@ fn unready(why: &str, checks: Vec<Dependency>) -> Response {
     responses((status = 200, description = "The metrics in the text format of Prometheus", body = String,
         content_type = "text/plain"), ListProblems))]
 pub async fn metrics(State(app): State<App>, _: NoQuery) -> Answer {
-    let reading = MetricReadings {
-        load: app.service.queue().table().load().await?,
-        figures: app.service.figures.queue_figures().await?,
-        received: app.service.intake.store.waiting().await?,
-        backlog: app.service.hooks.store.backlog().await?,
-        sent: app.service.hooks.dispatcher.counts(),
-        archives: app.service.archives.read().await?,
-        ready: app
-            .service
-            .readiness
-            .is_ready(app.service.dependencies())
-            .await,
-        space: app.service.items().blobs().space(),
-        settings: &app.service.settings,
-        now: app.service.now(),
-    };
-    let text = app.service.metrics.text(&reading);
+    let text = app.service.metrics_text().await?;
     let media_type = format!("{}; charset=utf-8", prometheus::TEXT_FORMAT);
     Ok(([(header::CONTENT_TYPE, media_type)], text).into_response())
 }

@@ -5,12 +5,13 @@ use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::edge::guard::AlreadyRecorded;
 use crate::openapi::{ListProblems, LookupProblems, UploadProblems};
+use crate::wire::fields::{Count, FieldReader, given};
 use crate::wire::links::rfc3339;
 use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::{Answer, Problem, ProblemBody, shorten};
 use crate::wire::public_base::public_path;
-use crate::wire::query::{NoQuery, Query};
-use crate::wire::request::{PathSegments, json_object, unknown};
+use crate::wire::query::{Moment, NoQuery, Query};
+use crate::wire::request::PathSegments;
 use crate::wire::words::{ScopeName, Word};
 use axum::Extension;
 use axum::Json;
@@ -18,13 +19,10 @@ use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
-use std::fmt::Display;
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::base::records::{Timestamp, parse_rfc3339};
-use ventriform_service::callers::{
-    Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
-};
+use ventriform_service::base::records::Timestamp;
+use ventriform_service::callers::{ApiKey, Maker, Quota};
+use ventriform_service::use_cases::keys::KeyOrder;
 
 /// A key. Its secret is shown once, when it is made.
 #[derive(Serialize, ToSchema)]
@@ -95,38 +93,57 @@ pub struct KeyList {
 }
 
 /// A key to be made.
-#[derive(ToSchema)]
-#[expect(
-    dead_code,
-    reason = "it documents the body, which is read field by field"
-)]
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 pub struct NewKey {
     /// Its name, which says what it is for.
-    #[schema(min_length = 1, max_length = 80, example = "scanner 2")]
-    name: String,
+    #[serde(default, deserialize_with = "given")]
+    #[schema(
+        required = true,
+        nullable = false,
+        min_length = 1,
+        max_length = 80,
+        example = "scanner 2"
+    )]
+    name: Option<String>,
     /// The acts that it allows: `read`, `submit` or `admin`.
-    #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
-    scope: String,
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = String, required = true, pattern = "^(read|submit|admin)$", example = "submit")]
+    scope: Option<ScopeName>,
     /// From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
     /// never ends.
-    #[schema(format = DateTime)]
-    expires_at: Option<String>,
+    #[schema(value_type = Option<String>, format = DateTime)]
+    expires_at: Option<Moment>,
     /// Requests per minute; the service's general limit if absent.
-    requests_per_minute: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    requests_per_minute: Option<Count>,
     /// Bytes that the tenant may store; the service's general limit if absent.
-    stored_bytes: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    stored_bytes: Option<Count>,
     /// Jobs of the tenant that may wait; the service's general limit if absent.
-    queued_jobs: Option<u64>,
+    #[schema(value_type = Option<u64>)]
+    queued_jobs: Option<Count>,
 }
 
-const KEY_FIELDS: [&str; 6] = [
-    "name",
-    "scope",
-    "expires_at",
-    "requests_per_minute",
-    "stored_bytes",
-    "queued_jobs",
-];
+impl NewKey {
+    fn order(self) -> Answer<KeyOrder> {
+        let missing = |field: &str| {
+            Problem::invalid_field(field, format!("`{field}` is missing."))
+                .fix("Give a name, and one of the scopes read, submit and admin.")
+        };
+        let count = |given: Option<Count>| given.map(|count| count.0);
+        Ok(KeyOrder {
+            name: self.name.ok_or_else(|| missing("name"))?,
+            scope: self.scope.ok_or_else(|| missing("scope"))?.0,
+            expires_at: self.expires_at.map(|moment| moment.0),
+            quota: Quota {
+                requests: count(self.requests_per_minute),
+                bytes: count(self.stored_bytes),
+                jobs: count(self.queued_jobs),
+            },
+        })
+    }
+}
 
 /// Make a key
 ///
@@ -146,17 +163,18 @@ pub async fn create_key(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let now = app.service.now();
-    let ends = Ends::from_caller(&app, &caller, now);
-    let wanted = read(&json_object(&app, request).await?, &caller, ends)?;
-    let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
-    let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
-    app.service.access.add_key(&key, &event).await?;
+    let order = FieldReader::read(&app, request)
+        .await?
+        .all::<NewKey>()?
+        .order()?;
+    let service = &app.service;
+    let made = service.create_key(&caller.by, &caller.identity, order);
+    let (key, text) = made.await?;
     app.guard.gate.refresh();
     let location = public_path(&format!("/v1/keys/{}", key.id));
     let body = KeyBody {
         key: Some(text),
-        ..KeyBody::from_key(key, now)
+        ..KeyBody::from_key(key, service.now())
     };
     let headers = [
         (header::LOCATION, location),
@@ -184,7 +202,7 @@ pub async fn list_keys(
 ) -> Answer<Json<KeyList>> {
     let page = page.charged().await?;
     let now = app.service.now();
-    let page = app.service.access.keys(Some(&caller.tenant), page).await?;
+    let page = app.service.keys(&caller.tenant, page).await?;
     let next_cursor = next_cursor(&page);
     let keys = page
         .items
@@ -208,8 +226,8 @@ pub async fn revoke_key(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer {
-    let key = app.service.access.key(&id).await?;
-    if key.is_none_or(|key| key.tenant != caller.tenant) {
+    let revoked = app.service.revoke_key(&caller.by, &id);
+    if !revoked.await? {
         return Err(Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
@@ -217,34 +235,8 @@ pub async fn revoke_key(
         )
         .fix("Take an id from the list at GET /v1/keys."));
     }
-    let now = app.service.now();
-    let event = caller.by.event(Activity::KeyRevoked, now).on(&id);
-    app.service.access.revoke_key(&id, now, &event).await?;
     app.guard.gate.refresh();
     Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())
-}
-
-/// When a key ends that a caller makes.
-#[derive(Clone, Copy)]
-struct Ends {
-    /// If it does not ask.
-    unasked: Option<Timestamp>,
-    /// At the latest.
-    last: Option<Timestamp>,
-}
-
-impl Ends {
-    fn from_caller(app: &App, caller: &Caller, now: Timestamp) -> Self {
-        let (_, unasked) = caller.own;
-        let is_token = caller.key.is_none() && caller.owner.is_some();
-        let life = app.service.settings.oidc_key_life.0;
-        let life = Timestamp::try_from(life.as_millis()).unwrap_or(Timestamp::MAX);
-        let asked = is_token.then(|| now.saturating_add(life));
-        Self {
-            unasked,
-            last: unasked.map(|end| asked.map_or(end, |asked| asked.max(end))),
-        }
-    }
 }
 
 /// Keys to revoke.
@@ -285,110 +277,9 @@ pub async fn revoke_keys_of_owner(
         Problem::invalid_field("owner", "`owner` is missing. Nothing was revoked.")
             .fix("Give the `owner` that GET /v1/keys shows; or DELETE /v1/keys/ID for one key.")
     })?;
-    let now = app.service.now();
-    let event = caller.by.event(Activity::KeyRevoked, now);
-    let access = &app.service.access;
-    let revoked = access
-        .revoke_keys_of(&owner, Some(&caller.tenant), now, &event)
-        .await?;
+    let revoked = app.service.revoke_keys_of(&caller.by, &owner).await?;
     app.guard.gate.refresh();
     Ok((Extension(AlreadyRecorded), Json(RevokedKeys { revoked })).into_response())
-}
-
-fn read(object: &Map<String, Value>, caller: &Caller, ends: Ends) -> Answer<KeyRequest> {
-    if let Some(name) = object
-        .keys()
-        .find(|name| !KEY_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &KEY_FIELDS));
-    }
-    for required in ["name", "scope"] {
-        if !object.contains_key(required) {
-            return Err(
-                Problem::invalid_field(required, format!("`{required}` is missing."))
-                    .fix("Give a name, and one of the scopes read, submit and admin."),
-            );
-        }
-    }
-    let wrong = |field: &str, fix: &str| {
-        Problem::invalid_field(field, format!("`{field}` cannot be used.")).fix(fix)
-    };
-    let text = |field: &str, fix: &str| match object.get(field) {
-        None | Some(Value::Null) => Ok(None),
-        Some(Value::String(text)) => Ok(Some(text.clone())),
-        Some(_) => Err(wrong(field, fix)),
-    };
-    let number = |field: &str| match object.get(field) {
-        None | Some(Value::Null) => Ok(None),
-        Some(value) => value
-            .as_u64()
-            .filter(|number| i64::try_from(*number).is_ok())
-            .map(Some)
-            .ok_or_else(|| wrong(field, "Give a whole number from 0 to 9223372036854775807.")),
-    };
-    let scopes = "Give one of read, submit, admin.";
-    let scope = text("scope", scopes)?.and_then(|name| name.parse::<Scope>().ok());
-    let scope = scope.ok_or_else(|| wrong("scope", scopes))?;
-    let time = "Give a time such as 2027-01-31T00:00:00Z.";
-    let expires_at = text("expires_at", time)?
-        .map(|text| parse_rfc3339(&text).ok_or_else(|| wrong("expires_at", time)))
-        .transpose()?;
-    if !caller.scope.includes(scope) {
-        return Err(beyond("scope", caller.scope));
-    }
-    if scope == Scope::Admin && caller.makers + 1 >= MOST_MAKERS {
-        // It could make one more.
-        return Err(beyond("scope", Scope::Submit));
-    }
-    // What the maker has itself, and what the operator allows everybody.
-    let (own, _) = caller.own;
-    let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
-        let asked = number(field)?;
-        match (asked, allowed) {
-            (Some(asked), Some(allowed)) if asked > allowed => Err(beyond(field, allowed)),
-            (None, _) => Ok(own),
-            (asked, _) => Ok(asked),
-        }
-    };
-    let expires_at = match (expires_at, ends.last) {
-        (Some(asked), Some(last)) if asked > last => {
-            return Err(beyond("expires_at", rfc3339(last)));
-        }
-        (asked, _) => asked.or(ends.unasked),
-    };
-    Ok(KeyRequest {
-        name: text("name", "Give a text.")?.unwrap_or_default(),
-        tenant: caller.tenant.clone(),
-        scope,
-        quota: Quota {
-            requests: bounded("requests_per_minute", own.requests, caller.quota.requests)?,
-            bytes: bounded("stored_bytes", own.bytes, caller.quota.bytes)?,
-            jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
-        },
-        maker: Maker::Caller(caller.key.clone()),
-        owner: caller.owner.clone(),
-        expires_at,
-    })
-}
-
-/// 422: a key gets no more than the one that makes it has, and than the operator allows.
-fn beyond(field: &str, allowed: impl Display) -> Problem {
-    Problem::invalid_field(
-        field,
-        format!("`{field}` is more than this caller may give: at most {allowed}."),
-    )
-    .fix("Give less, or leave it out; the operator can make keys with more by `ventriform keys create`.")
-}
-
-fn unusable(error: KeyError) -> Problem {
-    match error {
-        KeyError::Name => {
-            Problem::invalid_field("name", format!("Unusable: {error}.")).fix("Give a short name.")
-        }
-        KeyError::Expired => Problem::invalid_field("expires_at", format!("Unusable: {error}."))
-            .fix("Give a time in the future."),
-        KeyError::NoRandomNumbers => Problem::internal(error),
-    }
 }
 
 impl KeyBody {

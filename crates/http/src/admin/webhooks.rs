@@ -1,36 +1,27 @@
 //! Webhooks over HTTP: the endpoints and the signing secret of a tenant, and what became of
-//! deliveries. What is sent, and when, is decided in [`ventriform_service::network::hooks`].
+//! deliveries.
 //!
 //! A secret is shown in the one answer to the request that made it, and never again.
 
 use crate::app::App;
 use crate::edge::caller::Caller;
-use crate::openapi::{self, FileProblems, ListProblems, LookupProblems};
+use crate::openapi::{FileProblems, ListProblems, LookupProblems};
 use crate::resources::jobs::{self, ObjectDeliveryBody};
+use crate::wire::fields::FieldReader;
 use crate::wire::links::rfc3339;
 use crate::wire::problem::{Answer, Problem, shorten};
 use crate::wire::public_base::public_path;
 use crate::wire::query::NoQuery;
-use crate::wire::request::{PathSegments, json_object};
-use crate::wire::webhook_request::GivenWebhook;
+use crate::wire::request::PathSegments;
+use crate::wire::webhook_request::WebhookRequest;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
-use std::time::Duration;
 use utoipa::ToSchema;
-use ventriform_service::base::records::{Timestamp, random_id};
-use ventriform_service::network::hooks::{Delivery, HookEndpoint, SigningSecret};
-
-/// The time for which the former signing secret signs too.
-const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
-
-/// Most deliveries in one answer.
-const MOST_DELIVERIES: u32 = 100;
-
-/// The beginning of ids of deliveries to archives.
-const OBJECT_PREFIX: &str = "snd_";
+use ventriform_service::network::hooks::{Delivery, HookEndpoint};
+use ventriform_service::use_cases::webhooks::{Redelivered, is_object_delivery};
 
 /// A registered receiver.
 #[derive(Serialize, ToSchema)]
@@ -96,7 +87,7 @@ pub struct WebhookSecret {
 /// The receiver is told about every job of the caller's tenant, in requests signed after Standard
 /// Webhooks. The answer shows the signing secret; no later answer does.
 #[utoipa::path(post, path = "/v1/webhooks", tag = "webhooks",
-    request_body(content = openapi::WebhookRequest, content_type = "application/json"),
+    request_body(content = WebhookRequest, content_type = "application/json"),
     responses(
         (status = 201, description = "Registered", body = WebhookBody,
             headers(("Location" = String, description = "The webhook's path"))),
@@ -108,32 +99,9 @@ pub async fn create_webhook(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let object = json_object(&app, request).await?;
-    let checked = GivenWebhook::from_json(&object)?
-        .check(&app.service.hooks.guard)
-        .await?;
-    let secret = checked.secret.unwrap_or_else(SigningSecret::random);
-    let endpoint = HookEndpoint {
-        id: random_id("whk_"),
-        tenant: caller.tenant,
-        created_at: app.service.now(),
-        url: checked.url,
-        destination: checked.destination,
-        events: checked.events,
-        gone_at: None,
-    };
-    let limit = app.service.settings.webhook_endpoint_limit;
-    let store = app.service.hooks.store.clone();
-    let (made, signed) = (endpoint.clone(), secret.clone());
-    let add = async move { store.add_endpoint(&made, &signed, limit).await };
-    if !caller.by.change(add).await? {
-        return Err(Problem::new(
-            StatusCode::UNPROCESSABLE_ENTITY,
-            "too-many-webhooks",
-            format!("There are {limit} webhooks already."),
-        )
-        .fix("Remove one first, or ask the operator to raise `webhook_endpoint_limit`."));
-    }
+    let given: WebhookRequest = FieldReader::read(&app, request).await?.all()?;
+    let registered = app.service.register_webhook(&caller.by, given.into());
+    let (endpoint, secret) = registered.await?;
     let location = public_path(&format!("/v1/webhooks/{}", endpoint.id));
     let body = WebhookBody::new(endpoint, Some(secret.reveal()));
     let headers = [
@@ -151,7 +119,7 @@ pub async fn list_webhooks(
     caller: Caller,
     _: NoQuery,
 ) -> Answer<Json<WebhookList>> {
-    let endpoints = app.service.hooks.store.endpoints(&caller.tenant).await?;
+    let endpoints = app.service.webhooks(&caller.tenant).await?;
     let webhooks = endpoints.into_iter().map(|e| WebhookBody::new(e, None));
     Ok(Json(WebhookList {
         webhooks: webhooks.collect(),
@@ -170,11 +138,7 @@ pub async fn delete_webhook(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer<StatusCode> {
-    let now = app.service.now();
-    let store = app.service.hooks.store.clone();
-    let (tenant, webhook) = (caller.tenant.clone(), id.clone());
-    let remove = async move { store.remove_endpoint(&tenant, &webhook, now).await };
-    if caller.by.change(remove).await? {
+    if app.service.remove_webhook(&caller.by, &id).await? {
         Ok(StatusCode::NO_CONTENT)
     } else {
         Err(nothing_here("webhook", &id, "GET /v1/webhooks"))
@@ -188,12 +152,8 @@ pub async fn delete_webhook(
 #[utoipa::path(post, path = "/v1/webhooks/secret", tag = "webhooks",
     responses((status = 200, description = "The new secret", body = WebhookSecret), ListProblems))]
 pub async fn create_webhook_secret(State(app): State<App>, caller: Caller, _: NoQuery) -> Answer {
-    let secret = SigningSecret::random();
-    let until = app.service.now() + SECRET_OVERLAP.as_millis() as i64;
-    let store = app.service.hooks.store.clone();
-    let (tenant, new) = (caller.tenant.clone(), secret.clone());
-    let replace = async move { store.replace_secret(&tenant, &new, until).await };
-    caller.by.change(replace).await?;
+    let renewed = app.service.renew_signing_secret(&caller.by);
+    let (secret, until) = renewed.await?;
     let body = WebhookSecret {
         secret: secret.reveal(),
         former_until: rfc3339(until),
@@ -275,10 +235,7 @@ pub async fn list_deliveries(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer<Json<DeliveryList>> {
-    let store = &app.service.hooks.store;
-    let found = store
-        .deliveries(&caller.tenant, &id, MOST_DELIVERIES)
-        .await?;
+    let found = app.service.deliveries(&caller.tenant, &id).await?;
     if found.is_empty() {
         jobs::find(&app, &caller.tenant, &id).await?;
     }
@@ -313,40 +270,19 @@ pub async fn redeliver(
     PathSegments((id, delivery)): PathSegments<(String, String)>,
     _: NoQuery,
 ) -> Answer {
-    let now = app.service.now();
-    if delivery.starts_with(OBJECT_PREFIX) {
-        return redeliver_object(&app, &caller, &id, &delivery, now).await;
-    }
-    let store = app.service.hooks.store.clone();
-    let (tenant, job, message) = (caller.tenant.clone(), id.clone(), delivery.clone());
-    let again = async move { store.redeliver(&tenant, &job, &message, now).await };
-    let found = caller.by.change(again).await?;
-    let list = format!("GET /v1/jobs/{}/deliveries", shorten(&id));
-    let found = found.ok_or_else(|| nothing_here("delivery", &delivery, &list))?;
-    app.service.hooks.dispatcher.wake();
-    Ok((
-        StatusCode::ACCEPTED,
-        Json(RedeliveredBody::Message(found.into())),
-    )
-        .into_response())
-}
-
-/// Sends a DICOM object to its archive again.
-async fn redeliver_object(
-    app: &App,
-    caller: &Caller,
-    job: &str,
-    id: &str,
-    now: Timestamp,
-) -> Answer {
-    let store = app.service.archives.store.clone();
-    let (tenant, of, object) = (caller.tenant.clone(), job.to_owned(), id.to_owned());
-    let again = async move { store.redeliver_object(&tenant, &of, &object, now).await };
-    let found = caller.by.change(again).await?;
-    let list = format!("GET /v1/jobs/{}", shorten(job));
-    let found = found.ok_or_else(|| nothing_here("delivery", id, &list))?;
-    app.service.archives.woken.notify_one();
-    let body = RedeliveredBody::Object(found.into());
+    let found = app.service.redeliver(&caller.by, &id, &delivery);
+    let body = match found.await? {
+        Some(Redelivered::Message(message)) => RedeliveredBody::Message(message.into()),
+        Some(Redelivered::Object(object)) => RedeliveredBody::Object(object.into()),
+        None => {
+            let job = format!("GET /v1/jobs/{}", shorten(&id));
+            let list = match is_object_delivery(&delivery) {
+                true => job,
+                false => format!("{job}/deliveries"),
+            };
+            return Err(nothing_here("delivery", &delivery, &list));
+        }
+    };
     Ok((StatusCode::ACCEPTED, Json(body)).into_response())
 }
 

@@ -140,12 +140,7 @@ pub async fn list_received(
     Query((page, search)): Query<(PageQuery, ReceivedQuery)>,
 ) -> Answer<Json<ReceivedList>> {
     let (page, state) = (page.charged().await?, search.state.map(|word| word.0));
-    let page = app
-        .service
-        .intake
-        .store
-        .groups(&caller.tenant, state, page)
-        .await?;
+    let page = app.service.received(&caller.tenant, state, page).await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceivedList {
         intake: page.items.into_iter().map(ReceivedBody::from).collect(),
@@ -168,10 +163,7 @@ pub async fn forget_received(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let erased = app
-        .service
-        .forget_received(&caller.by, &caller.tenant, &id)
-        .await?;
+    let erased = app.service.forget_received(&caller.by, &id).await?;
     let receipt = erased.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,

@@ -182,7 +182,7 @@ impl Storing<'_> {
     /// # Errors
     /// The problem in the body; objects that are not stored are no error.
     async fn object(&mut self, pieces: impl Stream<Item = Answer<Bytes>>) -> Answer<()> {
-        let receiver = &self.app.service.intake.receiver;
+        let receiver = self.app.service.receiver();
         let mut pieces = std::pin::pin!(pieces);
         let mut object: Result<Incoming, ReceiveError> = receiver.begin().await;
         while let Some(piece) = pieces.next().await {
@@ -234,8 +234,9 @@ impl Storing<'_> {
             unparsed.reset();
             charge(OBJECT_MEMORY).await?;
             count += 1;
-            if count > self.app.service.settings.parts_limit {
-                return Err(body::too_many_files(self.app.service.settings.parts_limit));
+            let most = self.app.service.settings().parts_limit;
+            if count > most {
+                return Err(body::too_many_files(most));
             }
             let essence = part
                 .content_type()
@@ -269,7 +270,7 @@ async fn store(app: &App, caller: &Caller, study: Option<String>, request: Reque
             sender: caller.name.clone(),
             address: ClientAddress::current().to_string(),
         },
-        session: app.service.intake.sessions.begin(),
+        session: app.service.sessions().begin(),
         counting: reserve_upload(app, caller, request.headers(), 0).await?,
         outcome: Outcome::default(),
     };

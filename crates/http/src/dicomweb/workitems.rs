@@ -11,7 +11,6 @@ use crate::edge::quota::reserve_item;
 use crate::openapi::{self, LookupProblems};
 use crate::resources::erasures::{ReceiptBody, acknowledged};
 use crate::wire::links::rfc3339;
-use crate::wire::memory::{charge, end_rows, read_row};
 use crate::wire::problem::{Answer, Problem, ProblemBody, body, shorten};
 use crate::wire::public_base::public_path;
 use crate::wire::query::{NoQuery, QueryReader};
@@ -22,9 +21,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse};
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use std::time::{Duration, Instant};
 use utoipa::IntoParams;
-use ventriform::base::progress::{Monitor, Stage};
 use ventriform::results::export::dicom::is_uid;
 use ventriform_service::base::dicom_tags::{
     PROCEDURE_STEP_STATE, SOP_INSTANCE_UID, TRANSACTION_UID,
@@ -32,39 +29,17 @@ use ventriform_service::base::dicom_tags::{
 };
 use ventriform_service::base::records::{Erased, Timestamp};
 use ventriform_service::network::worklist::{
-    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
-    new_uid,
+    Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, new_uid,
 };
+use ventriform_service::use_cases::workitems::{ChangedWorkitem, FoundWorkitems};
 
 const MEDIA_TYPE: &str = "application/dicom+json";
 
 /// Media types of DICOM JSON.
 const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
 
-/// Most items of a tenant.
-const MAX_WORKITEMS: u64 = 100_000;
-
 /// Items of a page, unless the client asks for fewer, and at most.
 const PAGE_ITEMS: (usize, usize) = (100, 1000);
-
-/// Items read from the table at a time.
-const BATCH_ITEMS: u32 = 200;
-
-/// Bytes of a page of items, unless one alone has more.
-const ANSWER_BYTES: usize = 2 << 20;
-
-/// Memory of a search: a batch of items, parsed, and the answer.
-const SEARCH_MEMORY: u64 = 20 << 20;
-
-/// Longest search.
-const LONGEST_SEARCH: Duration = Duration::from_secs(10);
-
-/// Attempts at a change that another one came before.
-const CHANGE_TRIES: u32 = 20;
-
-/// Pause before the second try of a change; it grows by as much with each further one, so that the tries
-/// of many requests spread.
-const CHANGE_PAUSE: Duration = Duration::from_millis(2);
 
 /// The query of a new work item.
 #[derive(Deserialize, IntoParams)]
@@ -87,7 +62,7 @@ fn bare_uid(query: &QueryReader) -> Option<String> {
 #[utoipa::path(post, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "create_workitem",
     params(WorkitemQuery),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses(
         (status = 201, description = "Created",
             headers(("Location" = String, description = "The item's path"))),
@@ -112,33 +87,9 @@ pub async fn create_workitem(
     };
     let uid = named.map_or_else(new_uid, str::to_owned);
     require_uid(field, &uid)?;
-    let size = text_of(&attributes)?.len() as u64;
-    counting.arrived(size).await?;
-    let moment = now(&app);
-    let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
-    let (item, completed) = made.map_err(refused)?;
-    let worklist = app.service.worklist.clone();
-    let add = async move { worklist.add_workitem(&item, MAX_WORKITEMS).await };
-    match caller.by.change(add).await? {
-        AddedWorkitem::Done => {}
-        AddedWorkitem::Exists => {
-            return Err(Problem::new(
-                StatusCode::CONFLICT,
-                "workitem-exists",
-                "There is a work item of this UID.",
-            )
-            .fix("Give another UID, or none: then the service makes one."));
-        }
-        AddedWorkitem::Full => {
-            return Err(Problem::new(
-                StatusCode::INSUFFICIENT_STORAGE,
-                "too-many-workitems",
-                format!("There are {MAX_WORKITEMS} work items."),
-            )
-            .fix("Set `job_retention`, so that ended items are deleted."));
-        }
-    }
-    app.service.scheduled.notify_one();
+    let service = &app.service;
+    let created = service.create_workitem(&caller.by, &uid, attributes, &counting);
+    let completed = created.await?.map_err(refused)?;
     let location = [(header::LOCATION, path(&uid))];
     let warning = completed.then(|| {
         let text = "The Workitem was created with modifications.";
@@ -154,7 +105,7 @@ pub async fn create_workitem(
     operation_id = "get_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item")),
     responses(
-        (status = 200, description = "The item", body = openapi::WorkitemBody,
+        (status = 200, description = "The item", body = openapi::DicomJson,
             content_type = "application/dicom+json"),
         openapi::ScopeProblems, LookupProblems))]
 pub async fn get_workitem(
@@ -188,10 +139,7 @@ pub async fn delete_workitem(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let erased = app
-        .service
-        .erase_workitem(&caller.by, &caller.tenant, &uid)
-        .await?;
+    let erased = app.service.erase_workitem(&caller.by, &uid).await?;
     match erased {
         Erased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
         Erased::InUse | Erased::OnHold { .. } => Err(Problem::new(
@@ -227,7 +175,7 @@ pub struct SearchQuery {
     operation_id = "search_workitems",
     params(SearchQuery),
     responses(
-        (status = 200, description = "The items", body = openapi::WorkitemBody,
+        (status = 200, description = "The items", body = openapi::DicomJson,
             content_type = "application/dicom+json"),
         (status = 204, description = "No item matches"),
         (status = 413, description = "The search takes too long",
@@ -240,7 +188,7 @@ pub async fn search_workitems(
 ) -> Answer {
     let search: SearchQuery = query.take()?;
     let limit = search.limit.unwrap_or(PAGE_ITEMS.0).min(PAGE_ITEMS.1);
-    let mut skip = search.offset.unwrap_or(0);
+    let skip = search.offset.unwrap_or(0);
     let mut matching = Matching::default();
     let state = search.state.map(|it| ("ProcedureStepState".to_owned(), it));
     // All attributes are answered, and names are compared without regard to case.
@@ -254,49 +202,12 @@ pub async fn search_workitems(
                 .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
         })?;
     }
-    charge(SEARCH_MEMORY).await?;
-    let state = matching
-        .wanted(PROCEDURE_STEP_STATE)
-        .and_then(WorkitemState::parse);
-    let late = Instant::now() + LONGEST_SEARCH;
-    let (mut found, mut count, mut after) = (String::new(), 0, 0);
-    let mut more = false;
-    'search: while count < limit {
-        if Instant::now() > late {
-            return Err(too_broad());
-        }
-        let page = app
-            .service
-            .worklist
-            .workitems(&caller.tenant, state, after, BATCH_ITEMS);
-        let page = page.await?;
-        let Some(last) = page.last() else { break };
-        after = last.sequence;
-        for item in matched(&app, &matching, page).await? {
-            if skip > 0 {
-                skip -= 1;
-                continue;
-            }
-            if count == limit {
-                break 'search;
-            }
-            let item = serde_json::to_string(item.shown()).map_err(Problem::internal)?;
-            if count > 0 && found.len() + item.len() > ANSWER_BYTES {
-                more = true;
-                break 'search;
-            }
-            found.push(match count {
-                0 => '[',
-                _ => ',',
-            });
-            found.push_str(&item);
-            count += 1;
-        }
-    }
-    if count == 0 {
+    let service = &app.service;
+    let found = service.search_workitems(&caller.tenant, &matching, skip, limit);
+    let FoundWorkitems { text, more } = found.await?;
+    if text.is_empty() {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    found.push(']');
     let headers = [
         (header::CONTENT_TYPE, MEDIA_TYPE),
         (header::CACHE_CONTROL, "no-store"),
@@ -307,40 +218,7 @@ pub async fn search_workitems(
                     Additional results can be requested.";
         (header::WARNING, warning(text))
     });
-    Ok((StatusCode::OK, headers, AppendHeaders(warning), found).into_response())
-}
-
-/// The items that match. Wildcards may be compared with much text, so that takes turns with what is decoded.
-async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer<Vec<Workitem>> {
-    let is_match = |item: &Workitem, matching: &Matching| matching.matches(item.shown());
-    if !matching.has_patterns() {
-        let matched = items.into_iter().filter(|item| is_match(item, matching));
-        return Ok(matched.collect());
-    }
-    let matching = matching.clone();
-    let search = move |monitor: &Monitor<'_>| {
-        let mut matched = Vec::new();
-        for item in items {
-            if monitor.report(Stage::Read, 0.0).is_err() {
-                break;
-            }
-            if is_match(&item, &matching) {
-                matched.push(item);
-            }
-        }
-        matched
-    };
-    Ok(app.service.decoding.run(1, search).await?)
-}
-
-/// 413: PS3.18, table 8.3.4-1.
-fn too_broad() -> Problem {
-    Problem::new(
-        StatusCode::PAYLOAD_TOO_LARGE,
-        "search-too-broad",
-        format!("The search has not ended within {} seconds.", LONGEST_SEARCH.as_secs()),
-    )
-    .fix("Name the state, as in ProcedureStepState=SCHEDULED, or ask for fewer items by `limit` and `offset`.")
+    Ok((StatusCode::OK, headers, AppendHeaders(warning), text).into_response())
 }
 
 /// Change a work item
@@ -351,7 +229,7 @@ fn too_broad() -> Problem {
     operation_id = "update_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
         TransactionQuery, openapi::TransactionHeader),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses((status = 200, description = "Changed"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn update_workitem(
@@ -364,14 +242,9 @@ pub async fn update_workitem(
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let (changes, stated) = claimed_data_set(&app, query, &headers, request).await?;
-    counting.arrived(text_of(&changes)?.len() as u64).await?;
-    change(&app, &caller, &uid, |item, now| {
-        item.update(stated.as_deref(), changes.clone(), now)?;
-        Ok(Change::Done)
-    })
-    .await?;
-    // It may be ready now.
-    app.service.scheduled.notify_one();
+    let (service, stated) = (&app.service, stated.as_deref());
+    let updated = service.update_workitem(&caller.by, &uid, stated, &changes, &counting);
+    changed(&app, &caller, &uid, updated.await?).await?;
     Ok(StatusCode::OK.into_response())
 }
 
@@ -383,7 +256,7 @@ pub async fn update_workitem(
     operation_id = "change_workitem_state",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
         TransactionQuery, openapi::TransactionHeader),
-    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    request_body(content = openapi::DicomJson, content_type = "application/dicom+json"),
     responses((status = 200, description = "The item is in this state"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn change_workitem_state(
@@ -428,7 +301,7 @@ pub async fn change_workitem_state(
 #[utoipa::path(post, path = "/dicom-web/workitems/{uid}/cancelrequest", tag = "workitems",
     operation_id = "cancel_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item")),
-    request_body(content = Option<openapi::WorkitemBody>, content_type = "application/dicom+json"),
+    request_body(content = Option<openapi::DicomJson>, content_type = "application/dicom+json"),
     responses((status = 202, description = "Accepted"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
 pub async fn cancel_workitem(
@@ -462,39 +335,27 @@ async fn change(
     uid: &str,
     how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
 ) -> Answer<Change> {
-    for tried in 0..CHANGE_TRIES {
-        tokio::time::sleep(CHANGE_PAUSE * tried).await;
-        let mut item = find(app, caller, uid).await?;
-        let moment = now(app);
-        let before = text_of(&item.attributes)?.len();
-        let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
-        let size = text_of(&item.attributes)?.len();
-        let limit = app.service.settings.json_limit;
-        if size > before && size as u64 > limit.0 {
-            return Err(body::too_large(limit));
-        }
-        if done == Change::Already {
-            return Ok(done);
-        }
-        let worklist = app.service.worklist.clone();
-        let change = async move { worklist.change_workitem(&item).await };
-        if caller.by.change(change).await? {
-            return Ok(done);
-        }
-        // It is read anew.
-        end_rows(0).await;
-    }
-    Err(Problem::contended("this work item"))
+    let outcome = app.service.change_workitem(&caller.by, uid, how);
+    changed(app, caller, uid, outcome.await?).await
 }
 
-/// An item's attributes as they are stored.
-fn text_of(attributes: &DataSetJson) -> Answer<String> {
-    serde_json::to_string(attributes.object()).map_err(Problem::internal)
+/// The change that was made, or the problem why none was.
+async fn changed(
+    app: &App,
+    caller: &Caller,
+    uid: &str,
+    outcome: ChangedWorkitem,
+) -> Answer<Change> {
+    match outcome {
+        ChangedWorkitem::Done(change) => Ok(change),
+        ChangedWorkitem::Unknown => Err(missing(app, caller, uid).await),
+        ChangedWorkitem::Refused(refusal) => Err(refused(refusal)),
+        ChangedWorkitem::TooLarge(limit) => Err(body::too_large(limit)),
+    }
 }
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
-    let worklist = &app.service.worklist;
-    match read_row(|bytes| worklist.workitem_within(&caller.tenant, uid, bytes)).await? {
+    match app.service.workitem(&caller.tenant, uid).await? {
         Some(item) => Ok(item),
         None => Err(missing(app, caller, uid).await),
     }
@@ -502,8 +363,7 @@ async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
 
 /// 410 if the item was erased, else 404.
 async fn missing(app: &App, caller: &Caller, uid: &str) -> Problem {
-    let catalogue = app.service.items().catalogue();
-    match catalogue.erased_at(&caller.tenant, uid).await {
+    match app.service.erased_at(&caller.tenant, uid).await {
         Ok(Some(at)) if is_uid(uid) => Problem::new(
             StatusCode::GONE,
             "gone",
@@ -518,12 +378,6 @@ async fn missing(app: &App, caller: &Caller, uid: &str) -> Problem {
         .fix("Take a UID from the list at GET /dicom-web/workitems."),
         Err(error) => error.into(),
     }
-}
-
-/// The time, also as DICOM writes it.
-fn now(app: &App) -> (Timestamp, String) {
-    let now = app.service.now();
-    (now, dicom_time(now))
 }
 
 fn path(uid: &str) -> String {

@@ -6,7 +6,8 @@ use crate::wire::problem::{Answer, Problem};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
-use ventriform_service::base::records::{Tenant, Timestamp};
+use std::sync::Arc;
+use ventriform_service::base::records::Tenant;
 use ventriform_service::callers::{Agent, Identity, Quota, Scope};
 
 /// Who sent the request.
@@ -22,14 +23,8 @@ pub struct Caller {
     pub scope: Scope,
     /// Limits on what its tenant may store and queue by its requests; those of its key, or the general limits.
     pub quota: Quota,
-    /// Limits of its own key, and when that or its token expires.
-    pub own: (Quota, Option<Timestamp>),
-    /// The id of its key.
-    pub key: Option<String>,
-    /// The subject of the issuer that sends it, or whose key it is.
-    pub owner: Option<String>,
-    /// The number of keys that have made that key, one the other.
-    pub makers: usize,
+    /// Who it is, with the key and the keys that have made that.
+    pub identity: Arc<Identity>,
     /// Tells when its credentials end while it waits.
     pub watch: CredentialWatch,
 }
@@ -65,17 +60,14 @@ impl Caller {
 
 impl Caller {
     /// The caller of that identity, with the limits that apply to it.
-    pub fn new(identity: &Identity, quota: Quota, by: Agent, watch: CredentialWatch) -> Self {
+    pub fn new(identity: Arc<Identity>, quota: Quota, by: Agent, watch: CredentialWatch) -> Self {
         Self {
             by,
             tenant: identity.tenant.clone(),
             name: identity.name.clone(),
             scope: identity.scope,
             quota,
-            own: (identity.quota, identity.expires_at),
-            key: identity.key.clone(),
-            owner: identity.owner.clone(),
-            makers: identity.makers.keys.len(),
+            identity,
             watch,
         }
     }

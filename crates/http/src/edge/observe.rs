@@ -75,7 +75,7 @@ fn by_chance() -> [u8; 10] {
 async fn continue_trace(app: &App, mut request: Request, next: Next) -> AxumResponse {
     let given = Trace::from_headers(request.headers());
     let route = request.extensions().get::<MatchedPath>();
-    let span = app.service.spans.request(
+    let span = app.service.spans().request(
         method_of(&request),
         route.map_or(NO_ROUTE, MatchedPath::as_str),
         given
@@ -207,7 +207,7 @@ fn method_of(request: &Request) -> &'static str {
 /// continued.
 pub async fn measure(State(app): State<App>, request: Request, next: Next) -> AxumResponse {
     let method = method_of(&request);
-    let metrics = &app.service.metrics.requests;
+    let metrics = app.service.request_metrics();
     let waiting = Waiting {
         metrics: metrics.clone(),
         since: Instant::now(),

@@ -19,7 +19,7 @@ pub async fn reserve_upload(
     jobs: u64,
 ) -> Answer<Counting> {
     // A longer one is refused anyway.
-    let announced = announced_length(headers).min(app.service.settings.body_limit.0);
+    let announced = announced_length(headers).min(app.service.settings().body_limit.0);
     let addition = Addition {
         jobs,
         ..Addition::bytes(announced)
@@ -50,9 +50,7 @@ async fn reserve(
     addition: Addition,
 ) -> Answer<Counting> {
     let key = idempotency::key(headers)?;
-    let reserved =
-        app.service
-            .quotas
-            .reserve(&caller.tenant, caller.quota, addition, key.as_deref());
+    let quotas = app.service.quotas();
+    let reserved = quotas.reserve(&caller.tenant, caller.quota, addition, key.as_deref());
     Ok(reserved.await?)
 }

@@ -41,10 +41,10 @@ impl fmt::Debug for CredentialWatch {
 
 impl CredentialWatch {
     /// Watches the credentials of that identity.
-    pub fn new(app: &App, identity: &Identity) -> Self {
+    pub fn new(app: &App, identity: Arc<Identity>) -> Self {
         Self {
             app: app.clone(),
-            identity: Arc::new(identity.clone()),
+            identity,
         }
     }
 

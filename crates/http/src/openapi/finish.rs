@@ -14,13 +14,12 @@
 //! 7. The schemas of reports get the rows of their figures: `x-figures` ([`figures`](ventriform::results::figures)).
 //! 8. What several operations have alike stands under `components` ([`super::share`]).
 
-use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
+use super::bodies::{ANY_JOB_REQUESTS, job_discriminator, job_requests};
 use super::result_files::{self, binary, report_of};
 use super::share::share;
 use super::walk::{answers, contents, operations};
 use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
-use utoipa::ToSchema;
 use ventriform::results::figures;
 
 /// Requests and answers as a running service gave them.
@@ -154,8 +153,8 @@ fn require_input(schemas: &mut Value) {
         request["if"] = json!({"not": {"required": ["volume"]}});
         request["then"] = json!({"required": ["source"]});
     }
-    for request in [VolumeJobRequest::name(), SourceJobRequest::name()] {
-        schemas[&*request]["discriminator"] = json!(job_discriminator());
+    for (request, _) in ANY_JOB_REQUESTS {
+        schemas[request]["discriminator"] = json!(job_discriminator());
     }
 }
 

@@ -1,6 +1,5 @@
 //! Parameters that come from the tables of parameters, and headers.
 
-use serde_json::json;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn, ParameterStyle};
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{RefOr, Required};
@@ -9,52 +8,32 @@ use ventriform::parameters::{
     BeatChoice, ComparisonChoice, ComparisonParameters, FIT_SPECS, FitParameters, GatedParameters,
     Kind, ModelParameters, ParameterSpec, Parameters, schema_of,
 };
-use ventriform_service::base::records::Priority;
 
-/// Parameters of a model as query parameters.
-pub struct ModelQuery;
+/// Declares the parameters of tables as query parameters.
+macro_rules! queries {
+    ($(#[doc = $doc:tt] $name:ident => $parameters:expr;)+) => {$(
+        #[doc = $doc]
+        pub struct $name;
 
-impl IntoParams for ModelQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        ModelParameters::PARAMETER_SPECS
-            .iter()
-            .map(parameter_of)
-            .collect()
-    }
+        impl IntoParams for $name {
+            fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+                $parameters.collect()
+            }
+        }
+    )+};
 }
 
-/// Parameters of a segmentation as query parameters.
-pub struct SegmentationQuery;
-
-impl IntoParams for SegmentationQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        FitParameters::PARAMETER_SPECS
-            .iter()
-            .map(parameter_of)
-            .collect()
-    }
-}
-
-/// Parameters of a beat as query parameters.
-pub struct BeatQuery;
-
-impl IntoParams for BeatQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let of_fit = GatedParameters::fit_specs().map(parameter_of);
-        let own = BeatChoice::PARAMETER_SPECS.iter().map(parameter_of);
-        own.chain(of_fit).collect()
-    }
-}
-
-/// Parameters of a comparison as query parameters.
-pub struct ComparisonQuery;
-
-impl IntoParams for ComparisonQuery {
-    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let of_fit = ComparisonParameters::fit_specs().map(parameter_of);
-        let own = ComparisonChoice::PARAMETER_SPECS.iter().map(parameter_of);
-        own.chain(of_fit).collect()
-    }
+queries! {
+    /// Parameters of a model as query parameters.
+    ModelQuery => ModelParameters::PARAMETER_SPECS.iter().map(parameter_of);
+    /// Parameters of a segmentation as query parameters.
+    SegmentationQuery => FitParameters::PARAMETER_SPECS.iter().map(parameter_of);
+    /// Parameters of a beat as query parameters.
+    BeatQuery => BeatChoice::PARAMETER_SPECS.iter().map(parameter_of)
+        .chain(GatedParameters::fit_specs().map(parameter_of));
+    /// Parameters of a comparison as query parameters.
+    ComparisonQuery => ComparisonChoice::PARAMETER_SPECS.iter().map(parameter_of)
+        .chain(ComparisonParameters::fit_specs().map(parameter_of));
 }
 
 /// Those of the parameters of a segmentation that have these names.
@@ -90,23 +69,6 @@ impl PartialSchema for OrganField {
 }
 
 impl ToSchema for OrganField {}
-
-/// `priority` of a request for a job.
-pub struct PriorityField;
-
-impl PartialSchema for PriorityField {
-    fn schema() -> RefOr<Schema> {
-        let field = text()
-            .description(Some(
-                "How urgent the job is: every waiting job of a higher priority starts before it",
-            ))
-            .enum_values(Some(Priority::ALL.map(Priority::as_str)))
-            .default(Some(json!(Priority::default().as_str())));
-        Schema::from(field).into()
-    }
-}
-
-impl ToSchema for PriorityField {}
 
 fn text() -> ObjectBuilder {
     ObjectBuilder::new().schema_type(Type::String)

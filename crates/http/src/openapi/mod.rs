@@ -6,7 +6,7 @@
 //! | file | what it describes |
 //! |---|---|
 //! | [`inputs`] | headers; parameters of a model and a fit, which come from the tables of [`ventriform::parameters`], so a new one needs no change here |
-//! | [`bodies`] | request bodies that handlers read piece by piece |
+//! | [`bodies`] | request bodies that several structs make up, or that the library reads |
 //! | [`answers`] | answers and problems that several handlers share |
 //! | [`access`] | credentials, and how requests are refused before any handler |
 //! | [`operation`] | operations of handlers that serve several kinds of things |
@@ -35,14 +35,13 @@ pub use answers::{
     UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
-    ComparisonForm, ComparisonRequest, HoldRequest, JobParameters, JobRequest, MeshDocument,
-    NormalsRequest, SegmentationForm, StatedScanSchema, TagsPatch, TemplatePatch, UploadForm,
-    WebhookRequest, WorkitemBody,
+    ComparisonForm, ComparisonRequest, DicomJson, JobParameters, JobRequest, MeshDocument,
+    NormalsRequest, SegmentationForm, StatedScanSchema, TagsPatch, UploadForm,
 };
 pub use inputs::{
     BeatQuery, CachedHeaders, ComparisonQuery, ConditionalHeaders, ErasureHeader, EventHeader,
-    IdempotencyHeader, ModelQuery, OrganField, PreferHeader, PriorityField, SegmentationQuery,
-    TransactionHeader, WebhookSecretHeader, fit_parameters,
+    IdempotencyHeader, ModelQuery, OrganField, PreferHeader, SegmentationQuery, TransactionHeader,
+    WebhookSecretHeader, fit_parameters,
 };
 pub use operation::Documented;
 

@@ -1,7 +1,7 @@
 //! The common routes of volumes, models, segmentations and templates: they are listed in pages,
 //! shown one by one, and erased.
 //!
-//! [`Collection`] says how one kind of thing is read from the catalogue and shown;
+//! [`Collection`] says how one kind of thing is read and shown;
 //! [`routes`] serves it under `/v1/{plural}` and `/v1/{plural}/{id}`.
 
 use crate::app::App;
@@ -13,8 +13,7 @@ use crate::openapi::{
 use crate::resources::erasures::{self, CascadeQuery, ReceiptBody};
 use crate::resources::scans::{self, ScanQuery};
 use crate::resources::tags::TagQuery;
-use crate::wire::memory::read_row;
-use crate::wire::pagination::{PageQuery, charged_by_bytes, next_cursor};
+use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::Answer;
 use crate::wire::problem::not_found::missing;
 use crate::wire::query::{NoQuery, QueryReader};
@@ -34,10 +33,12 @@ use utoipa::openapi::schema::{ArrayBuilder, ObjectBuilder, Schema, SchemaType, T
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
+use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{
-    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, StoreError, Tenant,
+    ItemFilter, ListPage, ListRequest, Owned, Resource, StoreError, Tenant,
 };
 use ventriform_service::callers::Scope;
+use ventriform_service::use_cases::service::Service;
 
 /// One kind of stored thing.
 pub trait Collection: 'static {
@@ -50,7 +51,7 @@ pub trait Collection: 'static {
     /// Whether it is of a scan, by which it is searched.
     const SEARCHED_BY_SCAN: bool = true;
 
-    /// A row of the catalogue.
+    /// What is stored of it.
     type Row: Send;
 
     /// The row as JSON.
@@ -62,21 +63,20 @@ pub trait Collection: 'static {
     /// If the row holds something that cannot be read.
     fn body(app: &App, scope: Scope, row: Owned<Self::Row>) -> Result<Self::Body, StoreError>;
 
-    /// The tenant's row of that id, if it has no more than so many bytes.
+    /// The tenant's row of that id, for which the request is charged.
     fn row(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         id: &str,
-        bytes: u64,
-    ) -> impl Future<Output = Result<Bounded<Owned<Self::Row>>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<Option<Owned<Self::Row>>, ServiceError>> + Send;
 
-    /// A page of the tenant's rows, newest first.
+    /// A page of the tenant's rows, newest first, likewise.
     fn rows(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> impl Future<Output = Result<ListPage<Owned<Self::Row>>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<ListPage<Owned<Self::Row>>, ServiceError>> + Send;
 }
 
 /// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
@@ -141,15 +141,13 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 
 /// The tenant's row of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Owned<C::Row>> {
-    let catalogue = app.service.items().catalogue();
-    let found = if Resource::from_id(id) == Some(C::RESOURCE_KIND) {
-        read_row(|bytes| C::row(catalogue, tenant, id, bytes)).await?
-    } else {
-        None
+    let found = match Resource::from_id(id) == Some(C::RESOURCE_KIND) {
+        true => C::row(&app.service, tenant, id).await?,
+        false => None,
     };
     match found {
         Some(row) => Ok(row),
-        None => Err(missing(catalogue, tenant, C::RESOURCE_KIND, id).await),
+        None => Err(missing(app, tenant, C::RESOURCE_KIND, id).await),
     }
 }
 
@@ -170,10 +168,7 @@ async fn list<C: Collection>(
         filter.scan = query.take::<ScanQuery>()?.into();
     }
     let page = query.all::<PageQuery>()?.charged().await?;
-    let (catalogue, tenant) = (app.service.items().catalogue(), &caller.tenant);
-    let plan = catalogue.plan_items(tenant, C::RESOURCE_KIND, &filter, page);
-    let page = charged_by_bytes(page, plan.await?).await?;
-    let page = C::rows(catalogue, tenant, &filter, page).await?;
+    let page = C::rows(&app.service, &caller.tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
@@ -182,7 +177,7 @@ async fn list<C: Collection>(
         .collect::<Result<_, _>>()?;
     let mut headers = HeaderMap::new();
     if C::RESOURCE_KIND == Resource::Volume {
-        let limit = HeaderValue::from(app.service.settings.body_limit.0);
+        let limit = HeaderValue::from(app.service.settings().body_limit.0);
         let limit = [b"max-size=", limit.as_bytes()].concat();
         headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
     }
@@ -204,11 +199,10 @@ async fn show<C: Collection>(
             row,
         )?)?))
     };
-    let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     let kept = app
         .answers
-        .get(catalogue, asker, C::RESOURCE_KIND, &id, read);
+        .get(&app.service, asker, C::RESOURCE_KIND, &id, read);
     let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;
     Ok(answer.answer(&headers))
 }

@@ -5,17 +5,19 @@ use crate::edge::caller::Caller;
 use crate::edge::quota::reserve_job;
 use crate::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use crate::resources::files;
+use crate::resources::jobs::PriorityQuery;
 use crate::resources::jobs::filing::{self, UploadJob};
-use crate::resources::jobs::{PriorityQuery, archives, order_of};
 use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
 use crate::resources::tags::TagQuery;
+use crate::wire::fields::FieldReader;
+use crate::wire::job_fields::{ComparisonFields, OrderFields, SendFields};
 use crate::wire::limits::BodyLimits;
 use crate::wire::links::path_of;
 use crate::wire::negotiate::preferred_wait;
 use crate::wire::problem::{Answer, Problem, shorten};
 use crate::wire::query::QueryReader;
-use crate::wire::request::{json_object, media_type, parameters_of, text, unknown};
-use crate::wire::webhook_request::{WebhookQuery, webhook_of};
+use crate::wire::request::media_type;
+use crate::wire::webhook_request::{WebhookQuery, job_webhook};
 use axum::extract::{Request, State};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -102,19 +104,6 @@ fn offers() -> Vec<Offer> {
     ]
 }
 
-const BODY_FIELDS: [&str; 10] = [
-    "stress",
-    "rest",
-    "normals",
-    "parameters",
-    "priority",
-    "external_id",
-    "labels",
-    "webhook",
-    "send",
-    "to",
-];
-
 /// Compare rest and stress
 ///
 /// `stress` and `rest` name volumes, or segmentations or beats of them. One model is fitted anew to both; scans that are both
@@ -145,7 +134,7 @@ pub async fn create_comparison(
         return filing::file_upload(&app, &caller, job, query, request).await;
     }
     refuse_query(&app, query)?;
-    let settings = &app.service.settings;
+    let settings = app.service.settings();
     let limits = BodyLimits::of_json(settings, settings.json_limit);
     request.extensions_mut().insert(limits);
     let headers = request.headers().clone();
@@ -155,35 +144,27 @@ pub async fn create_comparison(
         products::choose(&headers, &offers())?;
     }
     let trace_parent = crate::edge::observe::trace_parent(&request);
-    let object = json_object(&app, request).await?;
-    if let Some(name) = object
-        .keys()
-        .find(|name| !BODY_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &BODY_FIELDS));
-    }
+    let mut body = FieldReader::read(&app, request).await?;
+    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let scans: ComparisonFields = body.all()?;
     let work = app.service.work_of(Resource::Comparison.noun())?;
-    let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
-    order.send = archives::send_of(
-        &app,
-        &order.tenant,
-        &object,
-        Resource::Comparison.noun(),
-        None,
-    )?;
-    let stress = scan_of(&app, &caller.tenant, &object, WhichScan::Stress).await?;
-    let mut parameters = parameters_of(&object)?.clone();
-    let rest = scan_of(&app, &caller.tenant, &object, WhichScan::Rest).await?;
+    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
+    order.send = send.order(&app, &order.tenant, Resource::Comparison.noun(), None)?;
+    let tenant = &caller.tenant;
+    let stress = scan_of(&app, tenant, scans.stress, WhichScan::Stress).await?;
+    let mut parameters = scans.parameters;
+    let rest = scan_of(&app, tenant, scans.rest, WhichScan::Rest).await?;
     add(&mut parameters, "rest", rest.volume)?;
     for (name, correction) in stress.corrections.into_iter().chain(rest.corrections) {
         parameters.entry(name).or_insert(correction);
     }
-    if let Some(normals) = text(&object, "normals")? {
-        add(&mut parameters, "normals", normals.to_owned())?;
+    if let Some(normals) = scans.normals {
+        add(&mut parameters, "normals", normals)?;
     }
     let parameters = work.parameters_from_json(&parameters)?;
-    // Last, since looking up the name of its host may take seconds.
-    order.webhook = webhook_of(&app, &object).await?;
+    if let Some(webhook) = webhook {
+        order.webhook = Some(job_webhook(&app, webhook).await?);
+    }
     let filed = app
         .service
         .file_job(work, Some(stress.volume), parameters, order, &counting)
@@ -234,29 +215,29 @@ struct NamedScan {
 async fn scan_of(
     app: &App,
     tenant: &Tenant,
-    object: &Map<String, Value>,
+    given: Option<String>,
     scan: WhichScan,
 ) -> Answer<NamedScan> {
     let field = scan.as_str();
-    let Some(id) = text(object, field)? else {
+    let Some(id) = given else {
         let missing = format!("`{field}` is missing.");
         return Err(Problem::invalid_field(field, missing)
             .fix("Give the id of a stored volume, segmentation or beat."));
     };
-    match Resource::from_id(id) {
+    match Resource::from_id(&id) {
         Some(Resource::Segmentation | Resource::Beat) => {
-            let product = products::stored(app, tenant, id).await?;
+            let product = app.service.product(tenant, &id).await?;
             let fit = product.map(|product| (product.item.volume, product.item.parameters));
             match fit {
                 Some((Some(volume), parameters)) => Ok(NamedScan {
                     volume,
                     corrections: ComparisonChoice::corrections_of(&parameters, scan),
                 }),
-                _ => Err(app.service.names_nothing(tenant, field, id).await?.into()),
+                _ => Err(app.service.names_nothing(tenant, field, &id).await?.into()),
             }
         }
         Some(Resource::Volume) => Ok(NamedScan {
-            volume: id.to_owned(),
+            volume: id,
             corrections: Map::new(),
         }),
         _ => {

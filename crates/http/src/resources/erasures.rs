@@ -5,9 +5,8 @@ use crate::edge::caller::Caller;
 use crate::edge::guard::AlreadyRecorded;
 use crate::openapi::{ListProblems, LookupProblems};
 use crate::wire::links::{path_of, rfc3339};
-use crate::wire::memory::read_row;
 use crate::wire::negotiate;
-use crate::wire::pagination::{PageQuery, charged_by_bytes, next_cursor};
+use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::not_found::{missing, no_receipt};
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::public_base::public_path;
@@ -20,7 +19,7 @@ use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::base::records::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
+use ventriform_service::base::records::{Erased, ErasureReason, Receipt, Resource};
 
 /// The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
 /// to an item.
@@ -190,24 +189,10 @@ pub async fn erase(
     cascade: bool,
     headers: &HeaderMap,
 ) -> Answer {
-    let order = ErasureOrder {
-        renewed_before: None,
-        tenant: caller.tenant.clone(),
-        id: id.clone(),
-        cascade,
-        by: caller.by.of_erasure(),
-        reason: ErasureReason::Request,
-    };
-    let erased = if Resource::from_id(&id) == Some(kind) {
-        app.service.items().erase(order).await?
-    } else {
-        Erased::Unknown
-    };
-    match erased {
+    let erased = app.service.erase_item(&caller.by, kind, &id, cascade);
+    match erased.await? {
         Erased::Done(receipt) => Ok(acknowledged(*receipt, headers)),
-        Erased::Unknown => {
-            Err(missing(app.service.items().catalogue(), &caller.tenant, kind, &id).await)
-        }
+        Erased::Unknown => Err(missing(app, &caller.tenant, kind, &id).await),
         Erased::InUse => Err(Problem::new(
             StatusCode::CONFLICT,
             "in-use",
@@ -255,11 +240,8 @@ pub async fn list_erasures(
     Query((page, search)): Query<(PageQuery, ReceiptQuery)>,
 ) -> Answer<Json<ReceiptList>> {
     let page = page.charged().await?;
-    let catalogue = app.service.items().catalogue();
     let item = search.item.as_deref();
-    let plan = catalogue.plan_receipts(&caller.tenant, item, page).await?;
-    let page = charged_by_bytes(page, plan).await?;
-    let page = catalogue.receipts(&caller.tenant, item, page).await?;
+    let page = app.service.receipts(&caller.tenant, item, page).await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceiptList {
         erasures: page.items.into_iter().map(ReceiptBody::from).collect(),
@@ -278,8 +260,7 @@ pub async fn get_erasure(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    let catalogue = app.service.items().catalogue();
-    match read_row(|bytes| catalogue.receipt_within(&caller.tenant, &id, bytes)).await? {
+    match app.service.receipt(&caller.tenant, &id).await? {
         Some(receipt) => validators::json(&headers, &ReceiptBody::from(receipt)),
         None => Err(no_receipt(&id)),
     }

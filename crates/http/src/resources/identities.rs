@@ -8,7 +8,7 @@ use crate::openapi::{self, LookupProblems};
 use crate::resources::collection::find;
 use crate::resources::erasures::on_hold;
 use crate::resources::volumes::Volumes;
-use crate::wire::problem::{Answer, Problem};
+use crate::wire::problem::Answer;
 use crate::wire::query::NoQuery;
 use crate::wire::request::{PathSegments, json_object};
 use crate::wire::validators::json;
@@ -16,8 +16,6 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use serde_json::{Map, Value};
-use ventriform_service::base::records::ScanFields;
-use ventriform_service::work::dicom;
 
 /// Whose scan a volume is
 ///
@@ -59,25 +57,9 @@ pub async fn state_identity(
 ) -> Answer<Json<Map<String, Value>>> {
     let stated = json_object(&app, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let catalogue = app.service.items().catalogue();
-    if catalogue.scan(&caller.tenant, &id).await?.is_none() {
-        let noted = app.service.note_scan(&caller.tenant, &id, &volume.files);
-        noted.await?;
-    }
-    let scan = catalogue.scan(&caller.tenant, &id).await?;
-    dicom::check_stated(&scan.unwrap_or_default(), &stated).map_err(|failure| {
-        let differs = failure.code == "identity-differs";
-        let problem = Problem::from(failure);
-        if differs { problem.conflict() } else { problem }
-    })?;
-    let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let volume = id.clone();
-    let state = async move {
-        let catalogue = items.catalogue();
-        let scan = ScanFields(stated);
-        catalogue.state_scan(&tenant, &volume, &scan).await
-    };
-    caller.by.change(state).await?;
+    let service = &app.service;
+    let state = service.state_scan(&caller.by, &id, &volume.files, stated);
+    state.await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(volume.ownership.scan.whole()))
 }
@@ -99,10 +81,7 @@ pub async fn erase_identity(
     _: NoQuery,
 ) -> Answer<StatusCode> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let volume = id.clone();
-    let erase = async move { items.erase_scan(&tenant, &volume).await };
-    if caller.by.change(erase).await? {
+    if app.service.erase_scan(&caller.by, &id).await? {
         return Ok(StatusCode::NO_CONTENT);
     }
     // It was erased after it was looked up, or it is on hold.

@@ -6,15 +6,35 @@ use crate::edge::caller::Caller;
 use crate::openapi::{self, LookupProblems};
 use crate::resources::collection::find;
 use crate::resources::volumes::{LegalHoldBody, Volumes};
-use crate::wire::problem::{Answer, Problem};
+use crate::wire::fields::{FieldReader, given};
+use crate::wire::problem::Answer;
+use crate::wire::problem::not_found::missing;
 use crate::wire::query::NoQuery;
-use crate::wire::request::{PathSegments, json_object, unknown};
+use crate::wire::request::PathSegments;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::StatusCode;
-use serde_json::Value;
-use ventriform::base::text::is_printable;
-use ventriform_service::base::records::LegalHold;
+use serde::Deserialize;
+use utoipa::ToSchema;
+use ventriform_service::base::records::{LegalHold, Resource};
+
+/// Why a volume is put on legal hold.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HoldRequest {
+    /// Why the volume must be kept
+    #[serde(default, deserialize_with = "given")]
+    #[schema(
+        required = true,
+        nullable = false,
+        min_length = 1,
+        max_length = 1000,
+        examples("Case 17/2026")
+    )]
+    reason: Option<String>,
+}
+
+const _: () = assert!(LegalHold::REASON_LENGTH == 1000, "the document says 1000");
 
 /// Put a volume on legal hold
 ///
@@ -22,7 +42,7 @@ use ventriform_service::base::records::LegalHold;
 /// Needs the scope `admin`. A second hold replaces the first one.
 #[utoipa::path(put, path = "/v1/volumes/{id}/hold", tag = "volumes", operation_id = "hold_volume",
     params(("id" = String, Path, description = "The volume's id")),
-    request_body(content = openapi::HoldRequest, content_type = "application/json"),
+    request_body(content = HoldRequest, content_type = "application/json"),
     responses((status = 200, description = "The hold", body = LegalHoldBody),
         openapi::HoldProblems, LookupProblems))]
 pub async fn hold_volume(
@@ -33,17 +53,15 @@ pub async fn hold_volume(
     request: Request,
 ) -> Answer<Json<LegalHoldBody>> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let object = json_object(&app, request).await?;
-    if let Some(name) = object.keys().find(|name| *name != "reason") {
-        return Err(unknown("field", name, &["reason"]));
+    let reason = FieldReader::read(&app, request)
+        .await?
+        .all::<HoldRequest>()?
+        .reason;
+    let reason = reason.as_deref().unwrap_or_default();
+    match app.service.hold_volume(&caller.by, &id, reason).await? {
+        Some(hold) => Ok(Json(LegalHoldBody::new(hold, caller.scope))),
+        None => Err(missing(&app, &caller.tenant, Resource::Volume, &id).await),
     }
-    let hold = LegalHold {
-        reason: reason(object.get("reason"))?,
-        since: app.service.now(),
-        by: caller.name.clone(),
-    };
-    set(&app, &caller, &id, Some(hold.clone())).await?;
-    Ok(Json(LegalHoldBody::new(hold, caller.scope)))
 }
 
 /// Lift the legal hold of a volume
@@ -61,39 +79,8 @@ pub async fn release_volume(
     _: NoQuery,
 ) -> Answer<StatusCode> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    set(&app, &caller, &id, None).await?;
-    Ok(StatusCode::NO_CONTENT)
-}
-
-async fn set(app: &App, caller: &Caller, id: &str, hold: Option<LegalHold>) -> Answer<()> {
-    let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let volume = id.to_owned();
-    let set = async move {
-        let catalogue = items.catalogue();
-        catalogue
-            .set_legal_hold(&tenant, &volume, hold.as_ref())
-            .await
-    };
-    if caller.by.change(set).await? {
-        Ok(())
-    } else {
-        find::<Volumes>(app, &caller.tenant, id).await.map(|_| ())
-    }
-}
-
-fn reason(value: Option<&Value>) -> Answer<String> {
-    let text = value.and_then(Value::as_str).unwrap_or_default().trim();
-    let control = |c: char| !is_printable(c) && c != '\n';
-    if (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control) {
-        Ok(text.to_owned())
-    } else {
-        Err(Problem::invalid_field(
-            "reason",
-            format!(
-                "`reason` must be a text of 1 to {} printable characters.",
-                LegalHold::REASON_LENGTH
-            ),
-        )
-        .fix("Say why the volume must be kept, such as the number of a case."))
+    match app.service.release_volume(&caller.by, &id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(missing(&app, &caller.tenant, Resource::Volume, &id).await),
     }
 }

@@ -5,14 +5,15 @@ use crate::edge::caller::Caller;
 use crate::edge::quota::{reserve_item, reserve_job};
 use crate::openapi::{self, FileProblems, UploadProblems};
 use crate::resources::jobs::filing;
-use crate::resources::jobs::order_of;
 use crate::resources::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use crate::wire::fields::FieldReader;
 use crate::wire::idempotency;
+use crate::wire::job_fields::{CohortFields, OrderFields};
 use crate::wire::links::{added, path_of, rfc3339};
 use crate::wire::problem::{Answer, ProblemBody};
 use crate::wire::query::Query;
-use crate::wire::request::{json_bytes, object_of, parsed, unknown};
-use crate::wire::webhook_request::webhook_of;
+use crate::wire::request::{json_bytes, object_of, parsed};
+use crate::wire::webhook_request::job_webhook;
 use axum::extract::{Request, State};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -105,16 +106,6 @@ pub struct NormalsQuery {
     name: Option<String>,
 }
 
-const BODY_FIELDS: [&str; 7] = [
-    "name",
-    "cases",
-    "parameters",
-    "priority",
-    "external_id",
-    "labels",
-    "webhook",
-];
-
 /// Add or build normal limits
 ///
 /// The body is a file of limits, as `ventriform normals build` writes it: it is added, the same file only once. Or the body is
@@ -159,13 +150,13 @@ pub async fn create_normals(
     }
     let bytes = json_bytes(request).await?;
     // A table is short; whatever is longer is read as limits, under the budget of decoding.
-    let table_limit = app.service.settings.json_limit.as_usize();
+    let table_limit = app.service.settings().json_limit.as_usize();
     let object = if bytes.len() <= table_limit {
         Some(parsed(&app, bytes.clone(), object_of).await?)
     } else {
         None
     };
-    let Some(mut object) = object.filter(|object| !object.contains_key("format")) else {
+    let Some(object) = object.filter(|object| !object.contains_key("format")) else {
         let added_normals =
             service.add_normals(&caller.by, tenant, name, bytes, caller.quota, &counting);
         let (stored, new) = added_normals.await?;
@@ -174,23 +165,20 @@ pub async fn create_normals(
     };
     drop(counting);
     let counting = reserve_job(&app, &caller, &headers).await?;
-    if let Some(name) = object
-        .keys()
-        .find(|name| !BODY_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &BODY_FIELDS));
-    }
+    let mut body = FieldReader::from_object(object);
+    let order: OrderFields = body.take()?;
+    let cohort: CohortFields = body.all()?;
     let work = service.work_of(Resource::Normals.noun())?;
-    let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
-    let mut parameters = crate::wire::request::parameters_of(&object)?.clone();
-    for field in ["name", "cases"] {
-        if let Some(value) = object.remove(field) {
-            parameters.insert(field.to_owned(), value);
-        }
+    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
+    let mut parameters = cohort.parameters;
+    for (field, value) in [("name", cohort.name), ("cases", cohort.cases)] {
+        parameters.extend(value.map(|value| (field.to_owned(), value)));
     }
     let parameters = work.parameters_from_json(&parameters)?;
     let volume = first_volume(&parameters);
-    order.webhook = webhook_of(&app, &object).await?;
+    if let Some(webhook) = webhook {
+        order.webhook = Some(job_webhook(&app, webhook).await?);
+    }
     let filed = service.file_job(work, volume, parameters, order, &counting);
     let filed = filed.await;
     let filed = filed.map_err(|error| error.naming("volume", "cases[0].volume"))?;

@@ -13,7 +13,6 @@ use crate::resources::collection::{Collection, find};
 use crate::resources::files;
 use crate::resources::scans::{self, ScanUidsBody};
 use crate::wire::links::path_of;
-use crate::wire::memory::{charge, read_row};
 use crate::wire::negotiate;
 use crate::wire::problem::not_found::{missing, no_such_file};
 use crate::wire::problem::{Answer, Problem};
@@ -36,16 +35,14 @@ use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
-use ventriform::base::progress::Monitor;
 use ventriform::results::export::{Format, Part};
+use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{
-    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError,
-    Tenant,
+    ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError, Tenant,
 };
 use ventriform_service::callers::Scope;
-use ventriform_service::limits::decoding::LITTLE_MEMORY;
+use ventriform_service::use_cases::service::Service;
 use ventriform_service::work::dicom::{self, ResultObject};
-use ventriform_service::work::{UploadFacts, part};
 
 /// One kind of product.
 pub trait ProductCollection: 'static {
@@ -92,12 +89,11 @@ impl<P: ProductCollection> Collection for P {
     type Body = P::Body;
 
     async fn row(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         id: &str,
-        bytes: u64,
-    ) -> Result<Bounded<Owned<Product>>, StoreError> {
-        catalogue.product_within(tenant, id, bytes).await
+    ) -> Result<Option<Owned<Product>>, ServiceError> {
+        service.product(tenant, id).await
     }
 
     fn body(app: &App, _: Scope, product: Owned<Product>) -> Result<P::Body, StoreError> {
@@ -105,14 +101,13 @@ impl<P: ProductCollection> Collection for P {
     }
 
     async fn rows(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Owned<Product>>, StoreError> {
-        catalogue
-            .products(tenant, P::RESOURCE_KIND, filter, page)
-            .await
+    ) -> Result<ListPage<Owned<Product>>, ServiceError> {
+        let products = service.products(tenant, P::RESOURCE_KIND, filter, page);
+        products.await
     }
 }
 
@@ -213,9 +208,6 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     }
     routes
 }
-
-/// Memory for a byte of the files that a page is made of: the file, what is read of it, and the page.
-const PAGE_MEMORY_PER_BYTE: u64 = 8;
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]
@@ -372,20 +364,13 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
     Ok(&offers[negotiate::require_offer(headers, &types)?])
 }
 
-/// The tenant's product of that id, for which the request is charged.
-pub async fn stored(app: &App, tenant: &Tenant, id: &str) -> Answer<Option<Owned<Product>>> {
-    let catalogue = app.service.items().catalogue();
-    Ok(read_row(|bytes| catalogue.product_within(tenant, id, bytes)).await?)
-}
-
 /// The tenant's product of that id, or the 404 or 410 that says why there is none.
 pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
-    let catalogue = app.service.items().catalogue();
-    match stored(app, tenant, id).await? {
+    match app.service.product(tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
             let resource = Resource::from_id(id).unwrap_or(Resource::Model);
-            Err(missing(catalogue, tenant, resource, id).await)
+            Err(missing(app, tenant, resource, id).await)
         }
     }
 }
@@ -410,13 +395,9 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
     };
     // What is used of it tells nobody whose scan it is.
     let asker = (tenant, false);
-    let kept = app.products.get(
-        app.service.items().catalogue(),
-        asker,
-        P::RESOURCE_KIND,
-        id,
-        read,
-    );
+    let kept = app
+        .products
+        .get(&app.service, asker, P::RESOURCE_KIND, id, read);
     let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
     Ok(product)
 }
@@ -485,24 +466,14 @@ async fn send_part(
     headers: &HeaderMap,
 ) -> Answer {
     let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
-    let stem = stem.to_owned();
-    let source = format!("{stem}.json");
-    let format = Format::from_extension(extension);
-    let (Some(format), Some(size)) = (format, product.file(&source).map(|file| file.bytes)) else {
-        let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
-        return Err(no_such_file(product.resource(), name, &names));
+    let made = match Format::from_extension(extension) {
+        Some(format) => app.service.mesh_part(product, stem, part, format).await?,
+        None => None,
     };
-    charge(size).await?;
-    let stored = app
-        .service
-        .items()
-        .whole(product.clone(), &[source.as_str()])
-        .await?;
-    let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
-    let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
-    match app.service.decoding.run_on(size, memory, make).await?? {
-        Some(file) => files::send_derived(product, file, headers).await,
-        None => Err(Problem::new(
+    match made {
+        None => Err(lacks_file(product, name)),
+        Some(Some(file)) => files::send_derived(product, file, headers).await,
+        Some(None) => Err(Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
             format!(
@@ -514,9 +485,6 @@ async fn send_part(
         .fix("Leave out `part`. Meshes of left ventricles have parts.")),
     }
 }
-
-/// Memory for a byte of a JSON mesh: numbers as text, parsed, and as a file.
-const MEMORY_PER_MESH_BYTE: u64 = 16;
 
 async fn get_report<P: ProductCollection>(
     State(app): State<App>,
@@ -591,47 +559,18 @@ async fn send_object(
     deidentify: bool,
     headers: &HeaderMap,
 ) -> Answer {
-    let id = &product.id;
-    let sources = object.source_files(product);
-    let sources = sources.iter().filter_map(|name| product.file(name));
-    charge(sources.map(|file| file.bytes).sum()).await?;
-    let result = app
-        .service
-        .items()
-        .result(tenant, id, |product| object.source_files(product))
-        .await?;
-    let result = result.ok_or_else(|| volume_erased(id))?;
-    let secret = if deidentify {
-        Some(
-            app.service
-                .items()
-                .catalogue()
-                .deidentification_secret(tenant)
-                .await?,
-        )
-    } else {
-        None
-    };
-    let memory = dicom::object_memory(UploadFacts::from_volume(&result.source.volume)?.shape);
-    let (bytes, limits) = (result.bytes(), app.service.engine.limits);
-    let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
-    let made = app
-        .service
-        .decoding
-        .run_on(bytes, memory, make)
-        .await?
-        .map_err(|failure| {
-            let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
-            let problem = Problem::from(failure);
-            if unknown { problem.conflict() } else { problem }
-        })?;
-    match made {
+    let service = &app.service;
+    let made = service.dicom_object(tenant, product, object, deidentify);
+    match made.await? {
         Some(file) => files::send_object(product, file, headers).await,
-        None => {
-            let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
-            Err(no_such_file(product.resource(), object.file_name(), &names))
-        }
+        None => Err(lacks_file(product, object.file_name())),
     }
+}
+
+/// 404: the product has no file of that name.
+fn lacks_file(product: &Product, name: &str) -> Problem {
+    let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
+    no_such_file(product.resource(), name, &names)
 }
 
 /// The paths of the DICOM objects that can be made of a product.
@@ -642,16 +581,6 @@ pub fn object_paths(product: &Product) -> Vec<String> {
         .filter(|object| object.is_of(product))
         .map(|object| format!("{itself}/{}", object.file_name()))
         .collect()
-}
-
-/// 409: whose scan a result is of went with its volume.
-pub fn volume_erased(id: &str) -> Problem {
-    Problem::new(
-        StatusCode::CONFLICT,
-        "volume-erased",
-        format!("The volume of `{id}` was erased, and with it whose scan it is."),
-    )
-    .fix("Upload the same file again; DICOM objects of the result can then be had.")
 }
 
 /// Who asks for a file of a product.
@@ -686,12 +615,11 @@ impl<'a> Asker<'a> {
     async fn sees(self, app: &App, product: &Product) -> Answer<Vec<Map<String, Value>>> {
         let rest = product.parameters.get(REST_FIELD).and_then(Value::as_str);
         let rest = rest.filter(|_| product.resource() == Resource::Comparison);
-        let catalogue = app.service.items().catalogue();
         let mut scans = Vec::new();
         for volume in product.volume.as_deref().into_iter().chain(rest) {
             let scan = match self.deidentify {
                 true => None,
-                false => catalogue.scan(self.tenant, volume).await?,
+                false => app.service.scan(self.tenant, volume).await?,
             };
             let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
             scans.push(shown.unwrap_or_default());
@@ -710,32 +638,13 @@ async fn send_named(
     if let Some(file) = product.file(name) {
         return files::send(app, product, file, headers).await;
     }
-    let work = app.service.engine.work(product.resource().noun());
-    match work
-        .filter(|work| name == files::REPORT_PAGE && !work.page_files().is_empty())
-        .cloned()
-    {
-        Some(work) => {
-            let files = product.files.iter();
-            let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));
-            let size: u64 = needed.map(|file| file.bytes).sum();
-            charge(PAGE_MEMORY_PER_BYTE * size).await?;
-            let stored = app
-                .service
-                .items()
-                .whole(product.clone(), work.page_files())
-                .await?;
-            let scans = asker.sees(app, product).await?;
-            let draw = move |_: &Monitor<'_>| work.page(&stored, &scans);
-            let page = app.service.decoding.run_on(size, LITTLE_MEMORY, draw);
-            let page = page.await??;
-            files::send_page(product, page, headers).await
-        }
-        None => {
-            let names: Vec<_> = product.files.iter().map(|file| file.name.clone()).collect();
-            Err(no_such_file(product.resource(), name, &names))
+    if name == files::REPORT_PAGE {
+        let scans = asker.sees(app, product).await?;
+        if let Some(page) = app.service.report_page(product, scans).await? {
+            return files::send_page(product, page, headers).await;
         }
     }
+    Err(lacks_file(product, name))
 }
 
 /// The parameter of a comparison that names the volume at rest.

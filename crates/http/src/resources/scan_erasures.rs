@@ -20,6 +20,7 @@ use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
+use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{
     ErasedItem, ScanErasureOrder, ScanErasurePlan, ScanSelection, ScansErased,
 };
@@ -189,9 +190,8 @@ pub async fn erase_volumes(
         by: caller.by.of_erasure(),
     };
     charge(PLAN_MEMORY).await?;
-    let items = app.service.items();
     if query.dry_run.unwrap_or(false) {
-        let plan = items.plan_scan_erasure(&order).await?;
+        let plan = app.service.items().plan_scan_erasure(&order).await?;
         if plan.is_too_large {
             return Err(too_large());
         }
@@ -201,7 +201,7 @@ pub async fn erase_volumes(
         let body = Json(PlanBody::from(plan));
         return Ok((unkept, Extension(AlreadyRecorded), body).into_response());
     }
-    match items.erase_scans(order).await? {
+    match app.service.items().erase_scans(order).await? {
         ScansErased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
         ScansErased::Kept(plan) => Err(kept(&plan)),
         ScansErased::Differs(plan) => Err(Problem::new(
@@ -214,7 +214,7 @@ pub async fn erase_volumes(
         )
         .at("plan")
         .fix("Look at the plan of a new dry run.")),
-        ScansErased::Changed => Err(Problem::contended("these volumes")),
+        ScansErased::Changed => Err(ServiceError::contended("these volumes").into()),
     }
 }
 

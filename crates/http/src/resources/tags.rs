@@ -8,25 +8,22 @@
 use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::resources::scans;
+use crate::wire::fields::FieldReader;
+use crate::wire::job_fields::{EXTERNAL_ID_LENGTH, LABEL_VALUE_LENGTH, TagFields};
 use crate::wire::memory::end_rows;
 use crate::wire::problem::{Answer, Problem, shorten};
-use crate::wire::request::{merge_patch, unknown};
 use axum::extract::Request;
 use futures::future::BoxFuture;
 use serde::Deserialize;
-use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
 use ventriform::base::text::is_printable;
+use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{TagFilter, Tags};
 use ventriform_service::callers::Scope;
 
-/// Longest external id, characters.
-pub const EXTERNAL_ID_LENGTH: usize = 128;
 /// Longest name of a label, characters.
-pub const LABEL_NAME_LENGTH: usize = 64;
-/// Longest value of a label, characters.
-pub const LABEL_VALUE_LENGTH: usize = 256;
+const LABEL_NAME_LENGTH: usize = 64;
 
 /// The names that this module reads: parameters of a query string or form, fields of a JSON object. (`label`
 /// is a parameter of models: the label of an object in a label map.)
@@ -98,20 +95,31 @@ pub fn shown(tags: Tags, scope: Scope) -> Tags {
     }
 }
 
-/// The tags of a JSON object that may have other fields.
-///
-/// # Errors
-/// 422 if they are malformed or too many.
-pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
-    let fields = object
-        .iter()
-        .filter(|(name, _)| TAG_FIELDS.contains(&name.as_str()));
-    let mut tags = Tags::default();
-    for (name, value) in fields {
-        merge_field(&mut tags, name, value)?;
+impl TagFields {
+    /// The tags after these changes of them: what is `null` goes, what is absent stays.
+    ///
+    /// # Errors
+    /// 422 if they are malformed or too many.
+    pub fn merged(&self, app: &App, mut tags: Tags) -> Answer<Tags> {
+        if let Some(id) = &self.external_id {
+            tags.external_id = id.as_deref().map(external_id).transpose()?;
+        }
+        match &self.labels {
+            None => {}
+            Some(None) => tags.labels.clear(),
+            Some(Some(labels)) => {
+                for (name, value) in labels {
+                    let name = label_name(name)?;
+                    match value {
+                        None => tags.labels.remove(&name),
+                        Some(text) => tags.labels.insert(name, label_value(text)?),
+                    };
+                }
+            }
+        }
+        limit_labels(app, &tags.labels)?;
+        Ok(tags)
     }
-    limit_labels(app, &tags.labels)?;
-    Ok(tags)
 }
 
 /// Attempts at a change of tags that others come before. Each time, one of the others has been made.
@@ -121,7 +129,7 @@ const CHANGE_TRIES: usize = 100;
 /// read first, so that nothing of the item is held while it comes; a change that comes between is read and merged anew.
 ///
 /// # Errors
-/// Those of [`merge_patch`], `tags_of` and [`merged`], 503 if others change the tags all the time, 503 or 507 if the storage
+/// Those of [`FieldReader::read_patch`], [`FieldReader::all`], `tags_of` and [`TagFields::merged`], 503 if others change the tags all the time, 503 or 507 if the storage
 /// fails.
 pub async fn change<'a>(
     app: &App,
@@ -130,70 +138,18 @@ pub async fn change<'a>(
     request: Request,
     tags_of: impl Fn() -> BoxFuture<'a, Answer<Tags>>,
 ) -> Answer<()> {
-    let patch = merge_patch(app, request).await?;
+    let patch: TagFields = FieldReader::read_patch(app, request).await?.all()?;
     for _ in 0..CHANGE_TRIES {
         let before = tags_of().await?;
-        let after = merged(app, before.clone(), &patch)?;
+        let after = patch.merged(app, before.clone())?;
         // The tags are a small part of the row.
         end_rows(0).await;
-        let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-        let item = id.to_owned();
-        let change = async move {
-            let changed = items
-                .catalogue()
-                .change_tags(&tenant, &item, &before, &after);
-            changed.await
-        };
-        if caller.by.change(change).await? {
+        let changed = app.service.change_tags(&caller.by, id, before, after);
+        if changed.await? {
             return Ok(());
         }
     }
-    Err(Problem::contended("these tags"))
-}
-
-/// The tags after a JSON merge patch: what is `null` goes, what is absent stays.
-///
-/// # Errors
-/// 400 for a field that is not a tag, 422 for one that is malformed.
-fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
-    for (name, value) in patch {
-        if !TAG_FIELDS.contains(&name.as_str()) {
-            return Err(unknown("field", name, &TAG_FIELDS));
-        }
-        merge_field(&mut tags, name, value)?;
-    }
-    limit_labels(app, &tags.labels)?;
-    Ok(tags)
-}
-
-fn merge_field(tags: &mut Tags, name: &str, value: &Value) -> Answer<()> {
-    match (name, value) {
-        ("external_id", Value::Null) => tags.external_id = None,
-        ("external_id", Value::String(text)) => tags.external_id = Some(external_id(text)?),
-        ("labels", Value::Null) => tags.labels.clear(),
-        ("labels", Value::Object(labels)) => {
-            for (name, value) in labels {
-                let name = label_name(name)?;
-                match value {
-                    Value::Null => tags.labels.remove(&name),
-                    Value::String(text) => tags.labels.insert(name, label_value(text)?),
-                    _ => return Err(not_text("labels", "The value of a label")),
-                };
-            }
-        }
-        ("labels", _) => {
-            return Err(
-                Problem::invalid_field("labels", "`labels` must be a JSON object.")
-                    .fix("Give an object such as {\"study\": \"42\"}."),
-            );
-        }
-        _ => return Err(not_text("external_id", "`external_id`")),
-    }
-    Ok(())
-}
-
-fn not_text(field: &str, what: &str) -> Problem {
-    Problem::invalid_field(field, format!("{what} must be a string.")).fix("Give a JSON string.")
+    Err(ServiceError::contended("these tags").into())
 }
 
 fn external_id(text: &str) -> Answer<String> {
@@ -245,7 +201,7 @@ fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<Stri
 }
 
 fn limit_labels(app: &App, labels: &BTreeMap<String, String>) -> Answer<()> {
-    let limit = app.service.settings.label_limit;
+    let limit = app.service.settings().label_limit;
     if labels.len() <= limit {
         Ok(())
     } else {

@@ -5,19 +5,17 @@ use crate::edge::caller::Caller;
 use crate::edge::quota::reserve_item;
 use crate::openapi::{self, LookupProblems, UploadProblems};
 use crate::resources::collection::find;
-use crate::resources::products::{
-    DownloadBody, Presented, ProductCollection, SoftwareBody, stored,
-};
+use crate::resources::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use crate::wire::fields::{FieldReader, given};
 use crate::wire::links::{added, path_of, rfc3339};
 use crate::wire::problem::{Answer, Problem, ProblemBody};
 use crate::wire::query::{NoQuery, Query};
-use crate::wire::request::{PathSegments, bytes_of, merge_patch, unknown};
+use crate::wire::request::{PathSegments, bytes_of};
 use crate::wire::upload::media_types::MESH_TYPES;
 use crate::wire::words::{MeshFrameName, MeshUnitName, OrganName};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Request, State};
-use futures::TryStreamExt;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
@@ -190,6 +188,16 @@ pub async fn create_template(
     Ok(added(new, &body.id, &body))
 }
 
+/// A JSON merge patch of a template's setting.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TemplatePatch {
+    /// Whether every `model=auto` fits the template
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = Option<bool>)]
+    library: Option<Option<bool>>,
+}
+
 /// Change a template's setting
 ///
 /// A JSON merge patch (RFC 7396) of `library`: whether every `model=auto` fits it, beside the built-in
@@ -198,8 +206,8 @@ pub async fn create_template(
     operation_id = "update_template",
     params(("id" = String, Path, description = "The template's id")),
     request_body(content(
-        (openapi::TemplatePatch = "application/merge-patch+json"),
-        (openapi::TemplatePatch = "application/json"))),
+        (TemplatePatch = "application/merge-patch+json"),
+        (TemplatePatch = "application/json"))),
     responses((status = 200, description = "The template", body = TemplateBody),
         openapi::PatchProblems, LookupProblems))]
 pub async fn update_template(
@@ -211,33 +219,15 @@ pub async fn update_template(
 ) -> Answer<Json<TemplateBody>> {
     let tenant = &caller.tenant;
     find::<Templates>(&app, tenant, &id).await?;
-    for (field, value) in &merge_patch(&app, request).await? {
-        let library = match (field.as_str(), value) {
-            (LIBRARY_FIELD, Value::Bool(library)) => *library,
-            (LIBRARY_FIELD, Value::Null) => false,
-            (LIBRARY_FIELD, _) => {
-                return Err(Problem::invalid_field(
-                    LIBRARY_FIELD,
-                    "`library` must be true or false.",
-                )
-                .fix("Give true if every `model=auto` is to fit the template."));
-            }
-            (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
-        };
-        let items = app.service.items().clone();
-        let (tenant, template) = (tenant.clone(), id.clone());
-        let set = async move {
-            let catalogue = items.catalogue();
-            catalogue.set_library(&tenant, &template, library).await
-        };
-        caller.by.change(set).await?;
+    let patch: TemplatePatch = FieldReader::read_patch(&app, request).await?.all()?;
+    if let Some(library) = patch.library {
+        let library = library.unwrap_or(false);
+        let set = app.service.set_library(&caller.by, &id, library);
+        set.await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::from_held(&app, template).into()))
 }
-
-/// The setting that [`TemplateBody`] shows.
-const LIBRARY_FIELD: &str = "library";
 
 /// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.
 async fn given_mesh(
@@ -248,40 +238,12 @@ async fn given_mesh(
 ) -> Answer<(Bytes, Option<String>)> {
     match model {
         None => Ok((body, None)),
-        Some(id) if body.is_empty() => stored_mesh(app, tenant, id).await,
+        Some(id) if body.is_empty() => Ok(app.service.stored_mesh(tenant, id).await?),
         Some(_) => Err(Problem::bad_request(
             "contradiction",
             "The request has both a body and `model`.",
         )
         .at("model")
         .fix("Send a mesh or name a model, not both.")),
-    }
-}
-
-/// The JSON mesh of a stored model or segmentation, with the id of its volume.
-async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let product = match Resource::from_id(id) {
-        Some(Resource::Model | Resource::Segmentation) => stored(app, tenant, id).await?,
-        _ => None,
-    };
-    let Some(product) = product else {
-        return Err(app.service.names_nothing(tenant, "model", id).await?.into());
-    };
-    match product.file("mesh.json") {
-        Some(file) if file.bytes <= MESH_SIZE.0 => {
-            let pieces = app
-                .service
-                .items()
-                .blobs()
-                .read(id, &file.record(), 0..file.bytes)
-                .await?;
-            let pieces: Vec<Bytes> = pieces.try_collect().await?;
-            Ok((pieces.concat().into(), product.volume.clone()))
-        }
-        _ => Err(Problem::invalid_field(
-            "model",
-            "The mesh of this model is too large to be fitted.",
-        )
-        .fix("Name a model of at most 5000 points.")),
     }
 }

@@ -17,10 +17,8 @@ use crate::wire::query::NoQuery;
 use crate::wire::request::PathSegments;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
-use ventriform::base::progress::Monitor;
 use ventriform_service::base::records::{FileRecord, Resource, StoredVolume};
 use ventriform_service::callers::Scope;
-use ventriform_service::limits::decoding::LITTLE_MEMORY;
 
 /// Download an upload
 ///
@@ -77,21 +75,6 @@ pub async fn download_volume_file(
     }
 }
 
-/// Whether the file cannot name a patient: it is one NIfTI file that holds nothing but voxels.
-async fn is_bare(app: &App, volume: &StoredVolume, file: &FileRecord) -> Answer<bool> {
-    if volume.files.len() > 1 {
-        return Ok(false);
-    }
-    let Some(local) = app.service.items().blobs().local(&volume.id, file).await? else {
-        return Ok(false);
-    };
-    let reader = app.service.engine.reader.clone();
-    let look = move |monitor: &Monitor<'_>| reader.is_bare(&local, monitor);
-    let decoding = &app.service.decoding;
-    let looked = decoding.run_on(file.bytes, LITTLE_MEMORY, look);
-    Ok(looked.await??)
-}
-
 async fn send(
     app: &App,
     caller: &Caller,
@@ -99,7 +82,7 @@ async fn send(
     file: &FileRecord,
     headers: &HeaderMap,
 ) -> Answer {
-    if !caller.scope.includes(Scope::Submit) && !is_bare(app, volume, file).await? {
+    if !caller.scope.includes(Scope::Submit) && !app.service.is_bare(volume, file).await? {
         caller.require(Scope::Submit)?;
     }
     let download = Download {

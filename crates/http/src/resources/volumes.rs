@@ -8,7 +8,7 @@ use crate::resources::collection::{Collection, find};
 use crate::resources::scans;
 use crate::resources::tags::{self, TagQuery};
 use crate::wire::links::{added, path_of, rfc3339};
-use crate::wire::problem::{Answer, Problem};
+use crate::wire::problem::Answer;
 use crate::wire::query::{NoQuery, QueryReader};
 use crate::wire::request::{PathSegments, unknown};
 use crate::wire::upload;
@@ -22,15 +22,15 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
-use ventriform::base::progress::Monitor;
 use ventriform::image::volume::GateFacts;
 use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{
-    BlobError, Bounded, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest,
-    LocalFile, Owned, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
+    FileRecord, ItemFilter, LegalHold, ListPage, ListRequest, Owned, Resource, StoreError,
+    StoredVolume, Tenant, content_id,
 };
 use ventriform_service::callers::Scope;
-use ventriform_service::work::{UploadFacts, preview_memory};
+use ventriform_service::use_cases::service::Service;
+use ventriform_service::work::UploadFacts;
 
 /// A later version of the program may draw a preview differently.
 const PREVIEW_CACHE_CONTROL: &str = "private, max-age=3600";
@@ -45,12 +45,11 @@ impl Collection for Volumes {
     type Body = VolumeBody;
 
     async fn row(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         id: &str,
-        bytes: u64,
-    ) -> Result<Bounded<Owned<StoredVolume>>, StoreError> {
-        catalogue.volume_within(tenant, id, bytes).await
+    ) -> Result<Option<Owned<StoredVolume>>, ServiceError> {
+        service.volume(tenant, id).await
     }
 
     fn body(
@@ -62,12 +61,12 @@ impl Collection for Volumes {
     }
 
     async fn rows(
-        catalogue: &dyn Catalogue,
+        service: &Service,
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Owned<StoredVolume>>, StoreError> {
-        catalogue.volumes(tenant, filter, page).await
+    ) -> Result<ListPage<Owned<StoredVolume>>, ServiceError> {
+        service.volumes(tenant, filter, page).await
     }
 }
 
@@ -382,33 +381,11 @@ pub async fn preview_volume(
     if let Some(unchanged) = not_modified(&headers, &etag, PREVIEW_CACHE_CONTROL) {
         return Ok(unchanged);
     }
-    let files = files_of(&app, &volume).await?;
-    let reader = app.service.engine.reader.clone();
-    let memory = preview_memory(UploadFacts::from_volume(&volume)?.shape);
-    let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
-    let decoding = &app.service.decoding;
-    let preview = decoding.run_on(volume.bytes, memory, draw).await?;
-    let png = preview.map_err(Problem::internal)?;
+    let png = app.service.preview(&volume).await?;
     let headers = [
         (header::CONTENT_TYPE, "image/png"),
         (header::ETAG, etag.as_str()),
         (header::CACHE_CONTROL, PREVIEW_CACHE_CONTROL),
     ];
     Ok((headers, png).into_response())
-}
-
-/// The files of a stored volume, to be read.
-///
-/// # Errors
-/// If one of them is missing or the store fails.
-pub async fn files_of(app: &App, volume: &StoredVolume) -> Answer<Vec<LocalFile>> {
-    let id = &volume.id;
-    if let Some(files) = app.service.items().volume_files(id, &volume.files).await? {
-        return Ok(files);
-    }
-    let missing = BlobError::new(
-        StoreFault::DamagedFile,
-        format!("a file of {id} is missing"),
-    );
-    Err(app.service.items().unless_erased(id, missing).await.into())
 }

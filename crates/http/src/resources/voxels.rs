@@ -5,7 +5,7 @@ use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::openapi::{self, LookupProblems};
 use crate::resources::collection::find;
-use crate::resources::volumes::{Volumes, files_of};
+use crate::resources::volumes::Volumes;
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::{Query, fields_of};
 use crate::wire::request::PathSegments;
@@ -17,11 +17,10 @@ use axum::response::IntoResponse;
 use serde::Deserialize;
 use utoipa::IntoParams;
 use utoipa::openapi::path::{Parameter, ParameterIn};
-use ventriform::base::progress::Monitor;
 use ventriform::image::volume::given_mask::MaskChoice;
 use ventriform::mesh::files::MeshStatement;
 use ventriform_service::base::records::content_id;
-use ventriform_service::work::{UploadFacts, voxels_memory};
+use ventriform_service::use_cases::volumes::VoxelChoice;
 
 /// A later version of the program may read a file differently.
 const CACHE_CONTROL: &str = "private, max-age=3600";
@@ -108,16 +107,11 @@ pub async fn download_voxels(
     if let Some(unchanged) = not_modified(&headers, &etag, CACHE_CONTROL) {
         return Ok(unchanged);
     }
-    let files = files_of(&app, &volume).await?;
-    let reader = app.service.engine.reader.clone();
-    let memory = voxels_memory(UploadFacts::from_volume(&volume)?.shape);
-    let mask = query.mask.unwrap_or(false).then(|| of_mask.choice());
-    let read = move |monitor: &Monitor<'_>| match &mask {
-        Some(choice) => reader.mask(&files, choice, monitor),
-        None => reader.voxels(&files, frame, monitor),
+    let choice = match query.mask {
+        Some(true) => VoxelChoice::Mask(of_mask.choice()),
+        _ => VoxelChoice::Frame(frame),
     };
-    let decoding = &app.service.decoding;
-    let bytes = decoding.run_on(volume.bytes, memory, read).await??;
+    let bytes = app.service.voxels(&volume, choice).await?;
     let headers = [
         (header::CONTENT_TYPE, "application/gzip"),
         (header::ETAG, etag.as_str()),

@@ -6,9 +6,7 @@ use crate::wire::held_body::HeldBody;
 use crate::wire::problem::Answer;
 use axum::body::{Body, HttpBody};
 use axum::response::Response;
-pub use ventriform_service::base::memory::{
-    Ledger, MEMORY_PER_ROW_BYTE, charge, end_rows, read_row,
-};
+pub use ventriform_service::base::memory::{Ledger, charge, charge_page, end_rows};
 
 /// Bytes of an answer that are not charged: the system's buffers hold as many.
 const SMALL_ANSWER_BYTES: u64 = 16 << 10;

@@ -2,8 +2,10 @@
 
 pub(crate) mod client;
 pub(crate) mod document;
+pub(crate) mod fields;
 pub(crate) mod held_body;
 pub(crate) mod idempotency;
+pub(crate) mod job_fields;
 pub(crate) mod limits;
 pub(crate) mod links;
 pub(crate) mod memory;

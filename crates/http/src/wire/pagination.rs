@@ -1,20 +1,16 @@
 //! `limit` and `cursor` of lists.
 
-use crate::wire::memory::{MEMORY_PER_ROW_BYTE, charge};
+use crate::wire::memory::charge_page;
 use crate::wire::problem::Answer;
 use crate::wire::query::parsed;
 use serde::{Deserialize, Deserializer};
 use utoipa::IntoParams;
-use ventriform_service::base::records::{ListPage, ListRequest, PagePlan};
+use ventriform_service::base::records::{ListPage, ListRequest};
 
 /// Entries of a page unless `limit` says otherwise.
 const DEFAULT_PAGE_ITEMS: u32 = 20;
 /// Greatest `limit`.
 const MAX_PAGE_ITEMS: u32 = 100;
-
-/// Memory for one entry of a page: its row, what is made of it, and its JSON. Labels of 16 KiB are the largest part, unless a
-/// page is [charged by its bytes](charged_by_bytes).
-const ENTRY_MEMORY: u64 = 64 << 10;
 
 /// The page of a list that is asked for.
 #[derive(Deserialize, IntoParams)]
@@ -37,22 +33,12 @@ impl PageQuery {
     /// 503 if there is no memory for it.
     pub async fn charged(self) -> Answer<ListRequest> {
         let limit = self.limit.unwrap_or(DEFAULT_PAGE_ITEMS);
-        charge(ENTRY_MEMORY * u64::from(limit)).await?;
+        charge_page(limit).await?;
         Ok(ListRequest {
             before: self.cursor,
             limit,
         })
     }
-}
-
-/// The page as it is planned, for which the request is charged beyond what [`PageQuery::charged`] has charged for it.
-///
-/// # Errors
-/// 503 if there is no memory for it.
-pub async fn charged_by_bytes(asked: ListRequest, plan: PagePlan) -> Answer<ListRequest> {
-    let charged = ENTRY_MEMORY * u64::from(asked.limit);
-    charge((MEMORY_PER_ROW_BYTE * plan.bytes).saturating_sub(charged)).await?;
-    Ok(plan.page)
 }
 
 fn limit<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {

@@ -289,12 +289,14 @@ pub fn parsed<'de, D: Deserializer<'de>, T>(
 }
 
 /// A moment as RFC 3339 writes it.
-///
-/// # Errors
-/// If it is another text.
-pub fn moment<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Timestamp>, D::Error> {
-    let expected = "a moment as RFC 3339 writes it, such as 2026-11-22T08:00:00Z";
-    parsed(deserializer, parse_rfc3339, expected).map(Some)
+#[derive(Debug, Clone, Copy)]
+pub struct Moment(pub Timestamp);
+
+impl<'de> Deserialize<'de> for Moment {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let expected = "a moment as RFC 3339 writes it, such as 2026-11-22T08:00:00Z";
+        parsed(deserializer, parse_rfc3339, expected).map(Self)
+    }
 }
 
 /// The names of the fields of a struct.

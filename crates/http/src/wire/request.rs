@@ -11,7 +11,6 @@ use axum::http::{HeaderMap, header};
 use futures::StreamExt;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use std::sync::LazyLock;
 use ventriform::base::progress::Monitor;
 use ventriform::parameters::nearest;
 
@@ -130,8 +129,8 @@ pub async fn parsed<T: Send + 'static>(
     }
     let length = bytes.len() as u64;
     charge(PARSED_MEMORY * length).await?;
-    let decoding = &app.service.decoding;
     let parse = move |_: &Monitor<'_>| parse(&bytes);
+    let decoding = app.service.decoding();
     decoding.run_on(length, PARSING_MEMORY, parse).await?
 }
 
@@ -144,32 +143,6 @@ pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Valu
     parsed(app, bytes, object_of).await
 }
 
-/// The object in the field `parameters` of a JSON object; empty if it has none.
-///
-/// # Errors
-/// 422 if it is another value.
-pub fn parameters_of(object: &Map<String, Value>) -> Answer<&Map<String, Value>> {
-    static EMPTY_OBJECT: LazyLock<Map<String, Value>> = LazyLock::new(Map::new);
-    match object.get("parameters") {
-        None => Ok(&EMPTY_OBJECT),
-        Some(Value::Object(parameters)) => Ok(parameters),
-        Some(_) => Err(
-            Problem::invalid_field("parameters", "`parameters` must be a JSON object.")
-                .fix("Give an object such as {\"points\": 150}."),
-        ),
-    }
-}
-
-/// The JSON merge patch (RFC 7396) in a request's body.
-///
-/// # Errors
-/// As [`json_object`].
-pub async fn merge_patch(app: &App, request: Request) -> Answer<Map<String, Value>> {
-    let types = ["application/merge-patch+json", "application/json"];
-    let bytes = bytes_of(request, &types).await?;
-    parsed(app, bytes, object_of).await
-}
-
 /// The JSON object in these bytes.
 ///
 /// # Errors
@@ -179,20 +152,5 @@ pub fn object_of(bytes: &[u8]) -> Answer<Map<String, Value>> {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(body::malformed_json("it is another JSON value")),
         Err(error) => Err(body::malformed_json(&error.to_string())),
-    }
-}
-
-/// A string in a JSON object.
-///
-/// # Errors
-/// 422 if it is another value.
-pub fn text<'a>(object: &'a Map<String, Value>, name: &str) -> Answer<Option<&'a str>> {
-    match object.get(name) {
-        None => Ok(None),
-        Some(Value::String(text)) => Ok(Some(text)),
-        Some(_) => Err(
-            Problem::invalid_field(name, format!("`{name}` must be a string."))
-                .fix("Give a JSON string."),
-        ),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Values read about an item (its row, the JSON made of it) follow from the database and the
 //! settings. They are kept under the tenant that asked and the id, with the version of the database
-//! ([`ventriform_service::base::records::Catalogue::version`]) under which they were read. Whatever is written changes the
+//! ([`Service::version`]) under which they were read. Whatever is written changes the
 //! version, and what was kept under other versions is never used: neither what was erased, changed or
 //! put on hold meanwhile, nor what another tenant has. Callers who see whose scan a volume is have
 //! values of their own, and so have clients who reach the service under another path.
@@ -14,7 +14,8 @@ use crate::wire::public_base::public_path;
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
-use ventriform_service::base::records::{Catalogue, Resource, Tenant};
+use ventriform_service::base::records::{Resource, Tenant};
+use ventriform_service::use_cases::service::Service;
 
 /// Memory for a value's place in the maps.
 const ENTRY_OVERHEAD_BYTES: usize = 200;
@@ -68,13 +69,13 @@ impl<V: Keep> ResponseCache<V> {
     /// Those of `read`.
     pub async fn get<B>(
         &self,
-        catalogue: &dyn Catalogue,
+        service: &Service,
         asker: Asker<'_>,
         resource: Resource,
         id: &str,
         read: impl AsyncFnOnce() -> Answer<ControlFlow<B, V>>,
     ) -> Answer<ControlFlow<B, V>> {
-        let version = catalogue.version();
+        let version = service.version();
         if Resource::from_id(id) == Some(resource)
             && let Some(version) = version
             && let Some(value) = self.find(version, asker, &public_path(id))
@@ -84,7 +85,7 @@ impl<V: Keep> ResponseCache<V> {
         let found = read().await?;
         if let ControlFlow::Continue(value) = &found
             && let Some(version) = version
-            && catalogue.version() == Some(version)
+            && service.version() == Some(version)
         {
             self.keep(version, asker, &public_path(id), value);
         }

@@ -6,7 +6,6 @@ use axum::http::{StatusCode, header};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use ventriform_service::base::memory::Requester;
-use ventriform_service::config::Settings;
 
 /// The open streams.
 pub struct EventStreams {
@@ -22,11 +21,11 @@ pub struct StreamPlace {
 }
 
 impl EventStreams {
-    /// With the operator's limits.
-    pub fn new(settings: &Settings) -> Self {
+    /// At most `limit` in all.
+    pub fn new(limit: usize, of_one_client: usize) -> Self {
         Self {
-            limit: settings.event_stream_limit,
-            of_one_client: settings.client_event_stream_limit,
+            limit,
+            of_one_client,
             open: Arc::default(),
         }
     }

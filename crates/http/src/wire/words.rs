@@ -12,6 +12,7 @@ use ventriform::mesh::files::{MeshFrame, MeshUnit};
 use ventriform::results::export::Part;
 use ventriform_service::base::records::{JobState, Priority};
 use ventriform_service::callers::Scope;
+use ventriform_service::network::hooks::HookEvent;
 use ventriform_service::network::intake::GroupState;
 
 /// A value given by its name.
@@ -50,6 +51,7 @@ macro_rules! named {
 }
 
 named! {
+    HookEvent, HookEventName, "HookEvent", Some("What is told of a job.");
     GroupState, ReceivedState, "ReceivedState", Some("What became of received objects.");
     JobState, JobStateName, "JobState", Some("The state of a job.");
     MeshFrame, MeshFrameName, "MeshFrame", None;

@@ -9,6 +9,9 @@ use std::time::Duration;
 /// Pause before a use case is tried again that failed for a reason which may pass.
 const STORAGE_RETRY: Duration = Duration::from_secs(5);
 
+/// Pause before a change is made again that others came before.
+const CONTENDED_RETRY: Duration = Duration::from_secs(1);
+
 /// Longest text of a caller that a message repeats, characters.
 const SHORTENED_LENGTH: usize = 80;
 
@@ -23,6 +26,9 @@ pub struct ServiceError {
     /// When to try again; `None` if that is not known, or does not help.
     pub retry_after: Option<Duration>,
 }
+
+/// The result of a use case.
+pub type ServiceResult<T> = Result<T, ServiceError>;
 
 /// The kind of a [`ServiceError`], by what the caller can do about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +74,14 @@ impl ServiceError {
             .into()
     }
 
+    /// Other callers change the same thing all the time, so that it was not changed.
+    pub fn contended(what: &str) -> Self {
+        let detail =
+            format!("Other requests change {what} at the same time, so that was not changed.");
+        let failure = Failure::new(Fault::Service, "busy", detail).fix(RETRY_FIX);
+        Self::new(Refusal::Unavailable, failure).after(CONTENDED_RETRY)
+    }
+
     /// Whether trying again later may help.
     pub fn may_pass(&self) -> bool {
         matches!(
@@ -100,6 +114,59 @@ impl ServiceError {
         } else {
             self
         }
+    }
+}
+
+/// Why an attempt failed that nobody waits for: a fetch, a delivery, a volume of received objects.
+#[derive(Debug)]
+pub enum AttemptError {
+    /// It may succeed later.
+    Retry {
+        /// The cause, as a sentence without patient data.
+        why: String,
+        /// How long the other side asks to wait.
+        asked: Option<Duration>,
+    },
+    /// Trying again does not help.
+    Permanent(Failure),
+}
+
+impl AttemptError {
+    /// One that may pass.
+    pub fn retry(why: impl Into<String>) -> Self {
+        Self::Retry {
+            why: why.into(),
+            asked: None,
+        }
+    }
+
+    /// One that lasts, with its code, what happened and what to do about it.
+    pub fn permanent(fault: Fault, code: &str, what: impl Into<String>, fix: &str) -> Self {
+        Self::Permanent(Failure::new(fault, code, what).fix(fix))
+    }
+
+    /// The cause.
+    pub fn why(&self) -> &str {
+        match self {
+            Self::Retry { why, .. } => why,
+            Self::Permanent(failure) => &failure.detail,
+        }
+    }
+}
+
+impl From<ServiceError> for AttemptError {
+    fn from(error: ServiceError) -> Self {
+        match error.may_pass() {
+            true => Self::retry(error.failure.detail),
+            false => Self::Permanent(*error.failure),
+        }
+    }
+}
+
+impl From<StoreError> for AttemptError {
+    fn from(error: StoreError) -> Self {
+        tracing::error!(%error, "the storage failed during an attempt");
+        Self::retry("The storage of this service failed.")
     }
 }
 
@@ -192,6 +259,11 @@ fn storage_failure(error: &StoreError) -> Failure {
 }
 
 const RETRY_FIX: &str = "Send the request again after the number of seconds in Retry-After.";
+
+/// A failure of a request whose `field` cannot be used.
+pub fn invalid_field(field: &str, detail: impl Into<String>) -> Failure {
+    Failure::new(Fault::Request, "invalid-field", detail).at(field)
+}
 
 /// A caller's text, cut to 80 characters for use in a message.
 pub fn shorten(text: &str) -> String {

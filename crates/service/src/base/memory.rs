@@ -20,7 +20,7 @@
 
 use crate::base::client::ClientAddress;
 use crate::base::error::{Refusal, ServiceError};
-use crate::base::records::{Bounded, Failure, Fault, StoreResult, Tenant};
+use crate::base::records::{Bounded, Failure, Fault, ListRequest, PagePlan, StoreResult, Tenant};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -33,6 +33,10 @@ const MEMORY_WAIT: Duration = Duration::from_secs(2);
 /// Memory for a stored byte of a row: the row, its JSON parsed (a job of 1000 cases takes nine times as much as its
 /// text), and the JSON of the answer.
 pub const MEMORY_PER_ROW_BYTE: u64 = 12;
+
+/// Memory for one entry of a page: its row, what is made of it, and its JSON. Labels of 16 KiB are the largest part,
+/// unless a page is charged by its bytes ([`charge_plan`]).
+const ENTRY_MEMORY: u64 = 64 << 10;
 
 /// Stored bytes of a single row that are not charged.
 const UNCHARGED_ROW_BYTES: u64 = 8 << 10;
@@ -404,6 +408,25 @@ where
             }
         }
     }
+}
+
+/// Charges for a page of at most `limit` entries.
+///
+/// # Errors
+/// As [`charge`].
+pub async fn charge_page(limit: u32) -> Result<(), ServiceError> {
+    charge(ENTRY_MEMORY * u64::from(limit)).await
+}
+
+/// The page as it is planned, for which the request is charged beyond what [`charge_page`] has charged for the one that
+/// was `asked`.
+///
+/// # Errors
+/// As [`charge`].
+pub async fn charge_plan(asked: ListRequest, plan: PagePlan) -> Result<ListRequest, ServiceError> {
+    let charged = ENTRY_MEMORY * u64::from(asked.limit);
+    charge((MEMORY_PER_ROW_BYTE * plan.bytes).saturating_sub(charged)).await?;
+    Ok(plan.page)
 }
 
 async fn charge_row(bytes: u64) -> Result<(), ServiceError> {

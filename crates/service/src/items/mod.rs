@@ -64,12 +64,12 @@ impl Items {
     }
 
     /// The records of volumes and products.
-    pub fn catalogue(&self) -> &dyn Catalogue {
+    pub(crate) fn catalogue(&self) -> &dyn Catalogue {
         &*self.catalogue
     }
 
     /// The files of volumes and products.
-    pub fn blobs(&self) -> &Arc<dyn BlobStore> {
+    pub(crate) fn blobs(&self) -> &Arc<dyn BlobStore> {
         &self.blobs
     }
 

@@ -3,7 +3,7 @@
 //! In: a [`JobOrder`]. Out: a job that is on disk. The tenant's quotas and the limit of the queue are checked here, and
 //! an order under the same idempotency key gets the same job.
 
-use crate::base::error::{Refusal, ServiceError, shorten};
+use crate::base::error::{Refusal, ServiceError, invalid_field, shorten};
 use crate::base::records::{
     Deleted, Failure, Fault, Filed, Idempotency, Interrupted, Job, JobWebhook, NewJob, Priority,
     Resource, SendOrder, SeriesSource, StoreError, Tags, Tenant, content_id, rfc3339,
@@ -126,10 +126,8 @@ impl Service {
             return Ok(&**work);
         }
         let detail = format!("There is no kind of job `{}`.", shorten(kind));
-        Err(Failure::new(Fault::Request, "invalid-field", detail)
-            .at("kind")
-            .fix(format!("Known kinds: {}.", self.kinds()))
-            .into())
+        let known = format!("Known kinds: {}.", self.kinds());
+        Err(invalid_field("kind", detail).fix(known).into())
     }
 
     /// The kinds of jobs, for messages.
@@ -318,8 +316,7 @@ impl Service {
                 resource.plural()
             ),
         };
-        let failure = Failure::new(Fault::Request, "invalid-field", detail);
-        Ok(failure.at(field).fix(fix).into())
+        Ok(invalid_field(field, detail).fix(fix).into())
     }
 }
 

@@ -3,16 +3,18 @@
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets
 //! the same limits; here they are refused before the body is read, and read under the budget of decoding.
 
-use crate::base::error::{Refusal, ServiceError};
+use crate::base::error::{Refusal, ServiceError, ServiceResult, invalid_field};
 use crate::base::records::{
-    ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, Tenant,
+    ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, StoreError, Tenant,
 };
 use crate::callers::{Agent, Quota};
 use crate::items::{NotAdded, TemplateSource, WorkOutput};
 use crate::limits::decoding::LITTLE_MEMORY;
 use crate::limits::quotas::Counting;
 use crate::use_cases::service::Service;
+use crate::work::TEMPLATE_BYTES;
 use bytes::Bytes;
+use futures::TryStreamExt;
 use ventriform::base::progress::Monitor;
 use ventriform::mesh::files::MeshStatement;
 
@@ -58,7 +60,7 @@ impl Service {
         mesh: GivenMesh,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let bytes = mesh.bytes.len() as u64;
         let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * bytes;
         let (reader, organ) = (self.engine.reader.clone(), mesh.organ.clone());
@@ -92,7 +94,7 @@ impl Service {
         profile: Bytes,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let reader = self.engine.reader.clone();
         let bytes = profile.len() as u64;
         let check = move |_: &Monitor<'_>| reader.profile(&profile);
@@ -115,7 +117,7 @@ impl Service {
         limits: Bytes,
         quota: Quota,
         _counting: &Counting,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let bytes = limits.len() as u64;
         let memory = LITTLE_MEMORY + LIMITS_MEMORY_PER_BYTE * bytes;
         let reader = self.engine.reader.clone();
@@ -126,6 +128,54 @@ impl Service {
             .await
     }
 
+    /// Sets whether every `model=auto` of the tenant fits a template of it.
+    pub async fn set_library(
+        &self,
+        by: &Agent,
+        template: &str,
+        library: bool,
+    ) -> ServiceResult<()> {
+        let (items, tenant) = (self.items().clone(), by.tenant().clone());
+        let id = template.to_owned();
+        let set = async move {
+            let catalogue = items.catalogue();
+            catalogue.set_library(&tenant, &id, library).await
+        };
+        by.change::<_, StoreError>(set).await?;
+        Ok(())
+    }
+
+    /// The JSON mesh of a tenant's model or segmentation, with the id of its volume.
+    ///
+    /// # Errors
+    /// `invalid-field` if there is none, or it is too large for a template; if the storage fails.
+    pub async fn stored_mesh(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+    ) -> ServiceResult<(Bytes, Option<String>)> {
+        let product = match Resource::from_id(id) {
+            Some(Resource::Model | Resource::Segmentation) => self.product(tenant, id).await?,
+            _ => None,
+        };
+        let Some(product) = product else {
+            return Err(self.names_nothing(tenant, "model", id).await?);
+        };
+        match product.file("mesh.json") {
+            Some(file) if file.bytes <= TEMPLATE_BYTES => {
+                let blobs = self.items().blobs();
+                let pieces = blobs.read(id, &file.record(), 0..file.bytes).await?;
+                let pieces: Vec<Bytes> = pieces.try_collect().await?;
+                Ok((pieces.concat().into(), product.volume.clone()))
+            }
+            _ => {
+                let detail = "The mesh of this model is too large to be fitted.";
+                let fix = "Name a model of at most 5000 points.";
+                Err(invalid_field("model", detail).fix(fix).into())
+            }
+        }
+    }
+
     async fn add_named(
         &self,
         by: &Agent,
@@ -133,7 +183,7 @@ impl Service {
         name: &str,
         output: WorkOutput,
         room: ProductRoom,
-    ) -> Result<Added, ServiceError> {
+    ) -> ServiceResult<Added> {
         let (items, tenant, name) = (self.items().clone(), tenant.clone(), name.to_owned());
         let add = async move {
             let added = items.add_named((&tenant, made), &name, output, room);
@@ -147,11 +197,7 @@ impl Service {
     ///
     /// # Errors
     /// `library-full`.
-    pub async fn require_product_room(
-        &self,
-        tenant: &Tenant,
-        kind: Resource,
-    ) -> Result<(), ServiceError> {
+    pub async fn require_product_room(&self, tenant: &Tenant, kind: Resource) -> ServiceResult<()> {
         let limit = self.product_room(kind, Quota::default()).count;
         let page = ListRequest {
             before: None,

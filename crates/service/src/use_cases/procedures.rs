@@ -263,7 +263,7 @@ async fn output(
 ) -> Result<WorkOutputObject, String> {
     let result = job.result.as_deref().unwrap_or_default();
     let object = service.object(&job.tenant, result, &send.name).await;
-    let object = object.map_err(|trouble| trouble.what().to_owned())?;
+    let object = object.map_err(|trouble| trouble.why().to_owned())?;
     let archive = service.settings.archives.named(&send.to, &job.tenant);
     Ok(WorkOutputObject {
         class: object.class,

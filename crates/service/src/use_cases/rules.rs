@@ -2,9 +2,9 @@
 //! filed as a request's are.
 
 use crate::base::client::ClientAddress;
-use crate::base::error::ServiceError;
+use crate::base::error::{AttemptError, ServiceError};
 use crate::base::records::{Failure, Fault, LocalFile, Priority, Resource, Tags, Tenant};
-use crate::network::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
+use crate::network::intake::{IntakeGroup, Rule, VolumeMaker};
 use crate::use_cases::filing::UnattendedJob;
 use crate::use_cases::pairs::{PairError, pair_of};
 use crate::use_cases::service::Service;
@@ -19,12 +19,12 @@ const CHUNK_BYTES: usize = 256 << 10;
 
 #[async_trait]
 impl VolumeMaker for Service {
-    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError> {
+    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, AttemptError> {
         // What was received counts already.
         let mut upload = VolumeUpload::new(self, &self.quotas.counted_before());
         for file in files {
             let file = tokio::fs::File::open(file).await;
-            let file = file.map_err(|error| MakeError::Later(error.to_string()))?;
+            let file = file.map_err(|error| AttemptError::retry(error.to_string()))?;
             let pieces = ReaderStream::with_capacity(file, CHUNK_BYTES);
             upload.write(pieces.map_err(ServiceError::internal)).await?;
         }
@@ -47,7 +47,7 @@ impl VolumeMaker for Service {
         rule: &Rule,
         volume: &str,
         key: String,
-    ) -> Result<Option<String>, MakeError> {
+    ) -> Result<Option<String>, AttemptError> {
         let rules = &self.settings.rules.0;
         let number = rules.iter().position(|known| known == rule).unwrap_or(0) + 1;
         let mut job = UnattendedJob {
@@ -80,12 +80,12 @@ impl VolumeMaker for Service {
     }
 }
 
-fn of_pair(error: PairError) -> MakeError {
+fn of_pair(error: PairError) -> AttemptError {
     match error {
         PairError::Store(error) => error.into(),
         PairError::NoRole => {
             let failure = Failure::new(Fault::Content, "rest-or-stress", error.to_string());
-            MakeError::Never(failure.fix(
+            AttemptError::Permanent(failure.fix(
                 "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or `first`, the \
                  scan that is made first on the same day with the lower dose; or compare the volumes by POST \
                  /v1/comparisons.",

@@ -1,9 +1,12 @@
-//! Whose scan a volume is: read from its files when it is stored, and again if a repair of the database has lost it.
+//! Whose scan a volume is: read from its files when it is stored, and again if a repair of the database has lost it;
+//! stated and erased by callers.
 
-use crate::base::error::ServiceError;
-use crate::base::records::{BlobError, FileRecord, ScanFields, StoreFault, Tenant};
+use crate::base::error::{Refusal, ServiceError, ServiceResult};
+use crate::base::records::{BlobError, FileRecord, ScanFields, StoreError, StoreFault, Tenant};
+use crate::callers::Agent;
 use crate::use_cases::service::Service;
-use crate::work::INSPECTION_MEMORY;
+use crate::work::{INSPECTION_MEMORY, dicom};
+use serde_json::{Map, Value};
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use ventriform::base::progress::Monitor;
@@ -12,17 +15,60 @@ use ventriform::base::progress::Monitor;
 const READ_RETRY: Duration = Duration::from_secs(30);
 
 impl Service {
-    /// The scan fields in the files of a stored volume, unless the tenant knows them already. To be
-    /// noted when the tenant uploads the volume again.
+    /// States whose scan a tenant's volume with these files is, in place of what was stated before.
     ///
     /// # Errors
-    /// If the storage fails.
+    /// Those of [`dicom::check_stated`], a conflict if the header says otherwise; if the storage fails.
+    pub async fn state_scan(
+        &self,
+        by: &Agent,
+        volume: &str,
+        files: &[FileRecord],
+        stated: Map<String, Value>,
+    ) -> ServiceResult<()> {
+        let tenant = by.tenant();
+        let scan = match self.scan(tenant, volume).await? {
+            None => {
+                self.note_scan(tenant, volume, files).await?;
+                self.scan(tenant, volume).await?
+            }
+            known => known,
+        };
+        dicom::check_stated(&scan.unwrap_or_default(), &stated).map_err(|failure| match failure
+            .code
+            .as_str()
+        {
+            "identity-differs" => ServiceError::new(Refusal::Conflict, failure),
+            _ => failure.into(),
+        })?;
+        let (items, tenant, volume) =
+            (self.items().clone(), by.tenant().clone(), volume.to_owned());
+        let state = async move {
+            let catalogue = items.catalogue();
+            let stated = ScanFields(stated);
+            catalogue.state_scan(&tenant, &volume, &stated).await
+        };
+        by.change::<_, StoreError>(state).await?;
+        Ok(())
+    }
+
+    /// Erases whose scan a tenant's volume is; the volume stays. `false` if there is no such volume, or it is on legal
+    /// hold.
+    pub async fn erase_scan(&self, by: &Agent, volume: &str) -> ServiceResult<bool> {
+        let (items, tenant, volume) =
+            (self.items().clone(), by.tenant().clone(), volume.to_owned());
+        let erase = async move { items.erase_scan(&tenant, &volume).await };
+        Ok(by.change(erase).await?)
+    }
+
+    /// The scan fields in the files of a stored volume, unless the tenant knows them already. To be
+    /// noted when the tenant uploads the volume again.
     pub(crate) async fn scan_to_note(
         &self,
         tenant: &Tenant,
         volume: &str,
         files: &[FileRecord],
-    ) -> Result<Option<ScanFields>, ServiceError> {
+    ) -> ServiceResult<Option<ScanFields>> {
         match self.items().catalogue().scan(tenant, volume).await? {
             Some(known) if known.erased_at.is_none() => Ok(None),
             _ => self.read_scan(volume, files).await,
@@ -30,14 +76,11 @@ impl Service {
     }
 
     /// The scan fields in the files of a stored volume; `None` if they name none.
-    ///
-    /// # Errors
-    /// If the storage fails.
-    pub async fn read_scan(
+    pub(crate) async fn read_scan(
         &self,
         volume: &str,
         files: &[FileRecord],
-    ) -> Result<Option<ScanFields>, ServiceError> {
+    ) -> ServiceResult<Option<ScanFields>> {
         let bytes = files.iter().map(|file| file.bytes).sum();
         let files = self.items().volume_files(volume, files).await?;
         let files = files.ok_or_else(|| {
@@ -80,15 +123,12 @@ impl Service {
     }
 
     /// Reads the scan of a stored volume and notes it for the tenant.
-    ///
-    /// # Errors
-    /// If the storage fails.
-    pub async fn note_scan(
+    pub(crate) async fn note_scan(
         &self,
         tenant: &Tenant,
         volume: &str,
         files: &[FileRecord],
-    ) -> Result<(), ServiceError> {
+    ) -> ServiceResult<()> {
         let found = self.read_scan(volume, files).await?;
         let noted = self
             .items()

@@ -3,8 +3,8 @@
 //! In: names as a request or an entry of the settings gives them. Out: a [`SeriesSource`] and a [`SendOrder`] that the
 //! tenant's archives can fulfil.
 
-use crate::base::error::shorten;
-use crate::base::records::{Failure, Fault, Resource, SendOrder, SeriesSource, Tenant};
+use crate::base::error::{invalid_field as invalid, shorten};
+use crate::base::records::{Failure, Resource, SendOrder, SeriesSource, Tenant};
 use crate::use_cases::service::Service;
 use crate::work::dicom;
 use ventriform::results::export::dicom::is_uid;
@@ -191,8 +191,4 @@ pub fn sendable_fix(kind: &str) -> String {
         [] => "Leave `send` and `to` out.".to_owned(),
         names => format!("Give some of {}.", names.join(", ")),
     }
-}
-
-fn invalid(field: &str, detail: impl Into<String>) -> Failure {
-    Failure::new(Fault::Request, "invalid-field", detail).at(field)
 }

@@ -176,6 +176,16 @@ fn kind_by_name(name: &str) -> Option<&'static str> {
         .find(|kind| name.ends_with(&format!(".{kind}")))
 }
 
+impl Service {
+    /// Refuses an upload of that announced length for which the disk has no room.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn require_disk_room(&self, bytes: u64) -> Result<(), ServiceError> {
+        Ok(self.items().blobs().require_room(bytes)?)
+    }
+}
+
 impl VolumeUpload {
     /// An empty upload. What it receives counts against a quota.
     pub fn new(service: &Service, counting: &Counting) -> Self {

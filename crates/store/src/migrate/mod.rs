@@ -95,10 +95,7 @@ pub enum MigrateError {
     #[error("{0}")]
     Io(#[from] io::Error),
     /// The target holds something else.
-    #[error(
-        "{target} is not empty: it holds {found}. Nothing was written. Give an empty database, an empty \
-         prefix of a bucket, or a folder that does not exist"
-    )]
+    #[error("{target} is not empty: it holds {found}. Nothing was written")]
     Occupied {
         /// The target.
         target: String,
@@ -108,8 +105,7 @@ pub enum MigrateError {
     /// Items of the folder are damaged.
     #[error(
         "these are damaged in the data folder, and were not copied:\n{}\nThe target stays unfinished, and no \
-         service starts on it. Restore them from a backup, or set them aside by `ventriform doctor --data-dir \
-         DIR --repair`; then give the same command again, which goes on where it stopped",
+         service starts on it",
         .0.join("\n")
     )]
     Damaged(Vec<String>),

@@ -4,13 +4,14 @@
 //! them. Its answer then says that the item is gone, as it would have a moment later.
 
 use crate::app::App;
-use crate::resources::products::volume_erased;
 use crate::wire::problem::Problem;
 use crate::wire::problem::not_found::missing;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde_json::Value;
-use ventriform_service::base::records::{Resource, StoreResult, Tenant};
+use ventriform_service::base::error::ServiceError;
+use ventriform_service::base::records::{Resource, Tenant};
+use ventriform_service::use_cases::results::volume_erased;
 
 /// The answer of a request on the item `id`, or why the service could not answer: 410 if the item was erased meanwhile,
 /// 409 if a volume was that it is made of.
@@ -39,19 +40,19 @@ async fn instead(
     tenant: &Tenant,
     id: &str,
     kind: Resource,
-) -> StoreResult<Option<Problem>> {
-    let catalogue = app.service.items().catalogue();
-    if catalogue.erased_at(tenant, id).await?.is_some() {
-        return Ok(Some(missing(catalogue, tenant, kind, id).await));
+) -> Result<Option<Problem>, ServiceError> {
+    let service = &app.service;
+    if service.erased_at(tenant, id).await?.is_some() {
+        return Ok(Some(missing(app, tenant, kind, id).await));
     }
-    let Some(product) = catalogue.product(tenant, id).await? else {
+    let Some(product) = service.product(tenant, id).await? else {
         return Ok(None);
     };
     let given = product.parameters.values().filter_map(Value::as_str);
     let volumes = product.volume.as_deref().into_iter().chain(given);
     for volume in volumes.filter(|id| Resource::from_id(id) == Some(Resource::Volume)) {
-        if catalogue.erased_at(tenant, volume).await?.is_some() {
-            return Ok(Some(volume_erased(id)));
+        if service.erased_at(tenant, volume).await?.is_some() {
+            return Ok(Some(volume_erased(id).into()));
         }
     }
     Ok(None)

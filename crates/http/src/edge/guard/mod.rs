@@ -41,6 +41,7 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
 use std::time::Instant;
 use ventriform_service::callers::{Allowance, Identity, Refusal, Scope};
 use ventriform_service::config::Settings;
@@ -126,14 +127,14 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
     if let Err(problem) = check_single(request.headers()) {
         return problem.into_response();
     }
-    if is_open_path(request.uri().path(), &app.service.settings) && request.method().is_safe() {
+    if is_open_path(request.uri().path(), app.service.settings()) && request.method().is_safe() {
         return next.run(request).await;
     }
     // A body cannot be shared between threads, so only the head is lent to what waits.
     let (mut request, body) = request.into_parts();
     let address = ClientAddress::current().to_string();
     let identity = match identify(&app, &request, &address).await {
-        Ok(identity) => identity,
+        Ok(identity) => Arc::new(identity),
         Err(problem) => return problem.into_response(),
     };
     let allowance = count(&app, &identity, &address);
@@ -145,7 +146,7 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
         Ok(act) => {
             // Anonymous callers have only their address.
             let tenant = identity.account.as_ref().map(|_| &identity.tenant);
-            let ledger = Ledger::new(&app.service.memory, tenant);
+            let ledger = Ledger::new(app.service.memory(), tenant);
             let answer = next.run(Request::from_parts(request, body));
             let response = ledger.clone().scope(answer).await;
             match answered(&ledger, response).await {
@@ -162,7 +163,7 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
     if let Some(allowance) = allowance {
         add_limits(&mut response, &allowance);
     }
-    CredentialWatch::new(&app, &identity).over(response)
+    CredentialWatch::new(&app, identity).over(response)
 }
 
 /// Who sends the request.
@@ -194,14 +195,14 @@ async fn identify(app: &App, request: &Parts, address: &str) -> Answer<Identity>
 /// Refuses what the caller may not do, and tells the handlers who it is.
 async fn admit(
     app: &App,
-    identity: &Identity,
+    identity: &Arc<Identity>,
     address: &str,
     request: &mut Parts,
 ) -> Answer<trail::Act> {
-    let quota = identity.limits(app.service.quotas.general);
+    let quota = identity.limits(app.service.quotas().general);
     let act = trail::Act::new(app, request, identity, address.to_owned());
-    let watch = CredentialWatch::new(app, identity);
-    let caller = Caller::new(identity, quota, act.agent(), watch);
+    let watch = CredentialWatch::new(app, identity.clone());
+    let caller = Caller::new(identity.clone(), quota, act.agent(), watch);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
     }
@@ -218,7 +219,7 @@ async fn admit(
 /// Counts a request for its caller and for the keys that have made the caller's key. Returns what is left where the
 /// least is left.
 fn count(app: &App, identity: &Identity, address: &str) -> Option<Allowance> {
-    let (guard, general) = (&app.guard, app.service.quotas.general);
+    let (guard, general) = (&app.guard, app.service.quotas().general);
     let own = match &identity.account {
         Some(account) => Some(account.clone()),
         None => guard.count_anonymous.then(|| format!("address {address}")),

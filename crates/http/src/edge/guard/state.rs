@@ -2,7 +2,6 @@
 
 use super::hosts::HostPolicy;
 use ventriform_service::callers::{Gate, RequestCounter};
-use ventriform_service::config::Settings;
 
 /// The state of the guard.
 pub struct Guard {
@@ -22,11 +21,11 @@ pub struct Guard {
 
 impl Guard {
     /// A guard that has counted nothing yet.
-    pub fn new(gate: Gate, hosts: HostPolicy, settings: &Settings, count_anonymous: bool) -> Self {
+    pub fn new(gate: Gate, hosts: HostPolicy, failure_limit: u64, count_anonymous: bool) -> Self {
         Self {
             gate,
             hosts,
-            failure_limit: settings.auth_failure_limit,
+            failure_limit,
             count_anonymous,
             requests: RequestCounter::default(),
             failures: RequestCounter::default(),

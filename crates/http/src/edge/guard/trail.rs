@@ -41,9 +41,8 @@ impl Act {
     pub fn new(app: &App, request: &Parts, identity: &Identity, address: String) -> Self {
         let route = request.extensions.get::<MatchedPath>();
         let event = event(request, identity, address, Activity::Read);
-        let (recorder, clock) = (app.service.recorder.clone(), app.service.clock().clone());
         Self {
-            agent: Agent::from_recorder(recorder, clock, event),
+            agent: app.service.agent_of(event),
             method: request.method.clone(),
             route: route.map_or_else(String::new, |route| route.as_str().to_owned()),
             object: item_of(request.uri.path()),
@@ -88,10 +87,10 @@ impl Act {
         }
         .or_else(|| place_of(&self.route));
         if self.method.is_safe() {
-            app.service.recorder.note(event).await;
+            app.service.recorder().note(event).await;
             return response;
         }
-        match app.service.recorder.record(event).await {
+        match app.service.recorder().record(event).await {
             Ok(()) => response,
             Err(_) => not_recorded().into_response(),
         }
@@ -167,7 +166,7 @@ pub async fn access_refused(app: &App, request: &Parts, identity: &Identity, add
 async fn note_refusal(app: &App, mut event: AuditEvent) {
     event.outcome = Outcome::Refused;
     event.recorded = app.service.now();
-    app.service.recorder.note(event).await;
+    app.service.recorder().note(event).await;
 }
 
 fn event(request: &Parts, identity: &Identity, address: String, activity: Activity) -> AuditEvent {

@@ -2,75 +2,42 @@
 //! that are sent to an archive.
 
 use crate::app::App;
-use crate::wire::problem::{Answer, Problem};
-use crate::wire::request::{text, unknown};
-use serde_json::{Map, Value};
+use crate::wire::job_fields::{SendFields, SourceRequest};
+use crate::wire::problem::Answer;
 use ventriform_service::base::records::{SendOrder, SeriesSource, Tenant};
-use ventriform_service::use_cases::series::{GivenSeries, sendable_fix};
+use ventriform_service::use_cases::series::GivenSeries;
 
-/// The fields of `source`.
-const SOURCE_FIELDS: [&str; 4] = ["archive", "dicomweb", "study", "series"];
-
-/// The series in the field `source` of a job.
-///
-/// # Errors
-/// 422 that names the part which cannot be used.
-pub async fn source_of(
-    app: &App,
-    tenant: &Tenant,
-    object: &Map<String, Value>,
-) -> Answer<Option<SeriesSource>> {
-    let given = match object.get("source") {
-        None => return Ok(None),
-        Some(Value::Object(given)) => given,
-        Some(_) => {
-            return Err(
-                Problem::invalid_field("source", "`source` must be a JSON object.").fix(
-                    "Give an object such as {\"archive\": \"pacs\", \"study\": UID, \"series\": UID}.",
-                ),
-            );
-        }
-    };
-    let given = given_series(given).map_err(|problem| problem.within("source"))?;
-    let source = app.service.series_source(tenant, given).await;
-    Ok(Some(source.map_err(|failure| failure.within("source"))?))
-}
-
-fn given_series(given: &Map<String, Value>) -> Answer<GivenSeries<'_>> {
-    if let Some(name) = given
-        .keys()
-        .find(|name| !SOURCE_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &SOURCE_FIELDS));
+impl SourceRequest {
+    /// The series, which can be fetched.
+    ///
+    /// # Errors
+    /// 422 that names the part which cannot be used.
+    pub async fn checked(&self, app: &App, tenant: &Tenant) -> Answer<SeriesSource> {
+        let given = GivenSeries {
+            archive: self.archive.as_deref(),
+            dicomweb: self.dicomweb.as_deref(),
+            study: self.study.as_deref(),
+            series: self.series.as_deref(),
+        };
+        let source = app.service.series_source(tenant, given).await;
+        Ok(source.map_err(|failure| failure.within("source"))?)
     }
-    Ok(GivenSeries {
-        archive: text(given, "archive")?,
-        dicomweb: text(given, "dicomweb")?,
-        study: text(given, "study")?,
-        series: text(given, "series")?,
-    })
 }
 
-/// The order in the fields `send` and `to` of a job of that kind.
-///
-/// # Errors
-/// 422 that names the field which cannot be used.
-pub fn send_of(
-    app: &App,
-    tenant: &Tenant,
-    object: &Map<String, Value>,
-    kind: &str,
-    source: Option<&SeriesSource>,
-) -> Answer<Option<SendOrder>> {
-    let to = text(object, "to")?;
-    let names = object.get("send").map(|names| {
-        serde_json::from_value(names.clone()).map_err(|_| {
-            Problem::invalid_field("send", "`send` must be a list of names.")
-                .fix(sendable_fix(kind))
-        })
-    });
-    let send = app
-        .service
-        .send_order(tenant, kind, names.transpose()?, to, source);
-    Ok(send?)
+impl SendFields {
+    /// The order of a job of that kind, from `source`.
+    ///
+    /// # Errors
+    /// 422 that names the field which cannot be used.
+    pub fn order(
+        self,
+        app: &App,
+        tenant: &Tenant,
+        kind: &str,
+        source: Option<&SeriesSource>,
+    ) -> Answer<Option<SendOrder>> {
+        let to = self.to.as_deref();
+        let order = app.service.send_order(tenant, kind, self.send, to, source);
+        Ok(order?)
+    }
 }

@@ -10,13 +10,11 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
-use ventriform_service::base::records::{
-    Job, JobState, Resource, SendOrder, SeriesSource, Timestamp,
-};
+use ventriform_service::base::records::{Job, JobState, Resource, SendOrder, SeriesSource};
 use ventriform_service::callers::Scope;
-use ventriform_service::jobs::QueuePosition;
 use ventriform_service::network::archive::{ObjectDelivery, Pull};
 use ventriform_service::network::hooks::DeliveryState;
+use ventriform_service::use_cases::reading::JobFacts;
 
 /// An accepted job.
 #[derive(Serialize, ToSchema)]
@@ -251,54 +249,20 @@ struct JobLinks {
 
 /// The JSON of a job for a caller of that scope, with its place in the queue if it waits.
 pub async fn describe(app: &App, scope: Scope, job: Job) -> Answer<JobBody> {
-    let context = Context::for_jobs(app, std::slice::from_ref(&job)).await?;
-    Ok(body(job, scope, &context))
-}
-
-/// Facts about jobs beside their rows.
-struct Context {
-    positions: BTreeMap<i64, QueuePosition>,
-    pulls: BTreeMap<String, Pull>,
-    deliveries: BTreeMap<String, Vec<ObjectDelivery>>,
-    now: Timestamp,
-}
-
-impl Context {
-    async fn for_jobs(app: &App, jobs: &[Job]) -> Answer<Self> {
-        let ids = |with: fn(&Job) -> bool| -> Vec<&str> {
-            let those = jobs.iter().filter(|job| with(job));
-            those.map(|job| job.id.as_str()).collect()
-        };
-        let store = &app.service.archives.store;
-        let sourced = ids(|job| job.source.is_some());
-        let sent = ids(|job| job.send.is_some() && job.state == JobState::Succeeded);
-        Ok(Self {
-            positions: app.service.queue().positions(jobs).await?,
-            pulls: if sourced.is_empty() {
-                BTreeMap::new()
-            } else {
-                store.pulls(&sourced).await?
-            },
-            deliveries: if sent.is_empty() {
-                BTreeMap::new()
-            } else {
-                store.sends(&sent).await?
-            },
-            now: app.service.now(),
-        })
-    }
+    let facts = app.service.job_facts(std::slice::from_ref(&job)).await?;
+    Ok(body(job, scope, &facts))
 }
 
 /// The JSON of each job for a caller of that scope, with the places in the queue of those that wait.
 pub async fn describe_all(app: &App, scope: Scope, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
-    let context = Context::for_jobs(app, &jobs).await?;
-    let bodies = jobs.into_iter().map(|job| body(job, scope, &context));
+    let facts = app.service.job_facts(&jobs).await?;
+    let bodies = jobs.into_iter().map(|job| body(job, scope, &facts));
     Ok(bodies.collect())
 }
 
-fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
+fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
     let tags = tags::shown(job.tags, scope);
-    let standing = context.positions.get(&job.sequence);
+    let standing = facts.positions.get(&job.sequence);
     let made = |resource: Resource| {
         let id = job.result.clone();
         id.filter(|id| Resource::from_id(id) == Some(resource))
@@ -312,11 +276,11 @@ fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = path_of(&job.id);
     let source = job.source.map(|source| {
-        let pull = context.pulls.get(&job.id);
+        let pull = facts.pulls.get(&job.id);
         SourceBody::new(source, pull)
     });
     let deliveries = job.send.map(|order| {
-        let made = context.deliveries.get(&job.id);
+        let made = facts.deliveries.get(&job.id);
         deliveries(order, made, job.state)
     });
     JobBody {
@@ -324,7 +288,7 @@ fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
         queue_position: standing.map(|s| s.position),
         estimated_start: standing
             .and_then(|s| s.starts_in_ms)
-            .map(|ms| rfc3339(context.now.saturating_add(ms as i64))),
+            .map(|ms| rfc3339(facts.now.saturating_add(ms as i64))),
         error: job.failure.map(|f| Problem::from(f).into_body()),
         created_at: rfc3339(job.created_at),
         started_at: job.started_at.map(rfc3339),

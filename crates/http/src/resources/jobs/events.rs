@@ -157,19 +157,13 @@ impl Follower {
                     look.set(queue.next_poll());
                     Some(self.look().await?)
                 }
-                () = self.app.service.closing.cancelled() => return None,
+                () = self.app.service.closing().cancelled() => return None,
             };
         }
     }
 
     async fn look(&self) -> Option<Job> {
-        self.app
-            .service
-            .queue()
-            .table()
-            .job(&self.id)
-            .await
-            .ok()
-            .flatten()
+        let job = self.app.service.followed_job(&self.id).await;
+        job.ok().flatten()
     }
 }

@@ -17,7 +17,7 @@ use crate::wire::negotiate;
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::QueryReader;
 use crate::wire::upload::{self, Upload};
-use crate::wire::webhook_request::GivenWebhook;
+use crate::wire::webhook_request::webhook_of_upload;
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -63,10 +63,7 @@ pub async fn file_upload(
     let key = idempotency::key(&headers)?;
     let work = service.work_of(job.makes.noun())?;
     // Whatever can be refused without the body is refused before the body is read.
-    let webhook = match GivenWebhook::of_upload(query.take()?, &headers)? {
-        Some(given) => Some(given.of_job(app).await?),
-        None => None,
-    };
+    let webhook = webhook_of_upload(app, query.take()?, &headers).await?;
     let mut given = query.rest();
     let mut stated = Stated::from_pairs(app, given.clone())?;
     let mut order = JobOrder {
@@ -182,10 +179,10 @@ async fn wait(
     headers: &HeaderMap,
     offers: &[Offer],
 ) -> Answer {
-    let patience = patience.min(app.service.settings.wait_limit.0);
+    let patience = patience.min(app.service.settings().wait_limit.0);
     let waited = tokio::select! {
         job = app.service.queue().wait(&job.id, patience) => job?,
-        () = app.service.closing.cancelled() => None,
+        () = app.service.closing().cancelled() => None,
         // The job was filed with valid credentials. What has become of it is not for those who have them no more.
         () = caller.watch.ended() => None,
     };

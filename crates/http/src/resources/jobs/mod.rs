@@ -5,6 +5,7 @@ pub mod events;
 pub mod filing;
 
 mod body;
+mod order;
 mod priority;
 
 pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
@@ -17,15 +18,15 @@ use crate::edge::quota::reserve_job;
 use crate::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use crate::resources::scans::{self, ScanQuery};
 use crate::resources::tags::{self, TagQuery};
-use crate::wire::idempotency;
-use crate::wire::memory::read_row;
-use crate::wire::pagination::{PageQuery, charged_by_bytes, next_cursor};
+use crate::wire::fields::FieldReader;
+use crate::wire::job_fields::{JobFields, OrderFields, SendFields};
+use crate::wire::pagination::{PageQuery, next_cursor};
 use crate::wire::problem::not_found::missing;
 use crate::wire::problem::{Answer, Problem, ProblemBody};
-use crate::wire::query::{NoQuery, Query, moment};
-use crate::wire::request::{PathSegments, json_object, parameters_of, text, unknown};
+use crate::wire::query::{Moment, NoQuery, Query};
+use crate::wire::request::PathSegments;
 use crate::wire::validators::ValidatedJson;
-use crate::wire::webhook_request::webhook_of;
+use crate::wire::webhook_request::job_webhook;
 use crate::wire::words::{JobStateName, PriorityName};
 use axum::Json;
 use axum::extract::{Request, State};
@@ -33,14 +34,11 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use futures::{FutureExt, TryFutureExt};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 use std::ops::ControlFlow;
 use utoipa::{IntoParams, ToSchema};
 use ventriform_service::base::records::{
-    Deleted, Interrupted, Job, JobFilter, Resource, Tenant, Timestamp,
+    Deleted, Interrupted, Job, JobFilter, Resource, SeriesSource, Tenant,
 };
-use ventriform_service::jobs::Work;
-use ventriform_service::use_cases::filing::JobOrder;
 
 /// A page of jobs.
 #[derive(Serialize, ToSchema)]
@@ -74,79 +72,38 @@ pub async fn create_job(
     let headers = request.headers().clone();
     let counting = reserve_job(&app, &caller, &headers).await?;
     let trace_parent = observe::trace_parent(&request);
-    let object = json_object(&app, request).await?;
-    let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
-    let (work, volume, parameters) = read_job(&app, &object, &mut order).await?;
+    let mut body = FieldReader::read(&app, request).await?;
+    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let job: JobFields = body.all()?;
+    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
+    let kind = job.kind.as_deref().unwrap_or("model");
+    let work = app.service.work_of(kind)?;
+    if let Some(source) = job.source {
+        order.source = Some(source.checked(&app, &order.tenant).await?);
+    }
+    order.send = send.order(&app, &order.tenant, kind, order.source.as_ref())?;
+    require_input(job.volume.as_deref(), order.source.as_ref())?;
+    let parameters = work.parameters_from_json(&job.parameters)?;
+    if let Some(webhook) = webhook {
+        order.webhook = Some(job_webhook(&app, webhook).await?);
+    }
     let filed = app
         .service
-        .file_job(work, volume, parameters, order, &counting);
+        .file_job(work, job.volume, parameters, order, &counting);
     filing::accepted(&app, filed.await?).await
 }
 
-/// The order of a job in a JSON object: its names, its priority and its idempotency key.
-///
-/// # Errors
-/// 400 for an unusable key, 422 for an unusable name or priority.
-pub fn order_of(
-    app: &App,
-    caller: &Caller,
-    headers: &HeaderMap,
-    object: &Map<String, Value>,
-    trace_parent: Option<String>,
-) -> Answer<JobOrder> {
-    Ok(JobOrder {
-        tags: tags::of_object(app, object)?,
-        priority: priority::of_object(object)?,
-        key: idempotency::key(headers)?,
-        trace_parent,
-        ..JobOrder::new(caller.by.clone(), caller.tenant.clone(), caller.quota)
-    })
-}
-
-const JOB_FIELDS: [&str; 10] = [
-    "kind",
-    priority::PRIORITY_FIELD,
-    "volume",
-    "source",
-    "parameters",
-    "external_id",
-    "labels",
-    "webhook",
-    "send",
-    "to",
-];
-
-/// The work, the volume and the parameters of a job; the rest goes into `order`.
-async fn read_job<'a>(
-    app: &'a App,
-    object: &Map<String, Value>,
-    order: &mut JobOrder,
-) -> Answer<(&'a dyn Work, Option<String>, Map<String, Value>)> {
-    if let Some(name) = object
-        .keys()
-        .find(|name| !JOB_FIELDS.contains(&name.as_str()))
-    {
-        return Err(unknown("field", name, &JOB_FIELDS));
-    }
-    let kind = text(object, "kind")?.unwrap_or("model");
-    let work = app.service.work_of(kind)?;
-    order.source = archives::source_of(app, &order.tenant, object).await?;
-    order.send = archives::send_of(app, &order.tenant, object, kind, order.source.as_ref())?;
-    let volume = match (text(object, "volume")?, &order.source) {
-        (None, None) => {
-            return Err(Problem::invalid_field("volume", "`volume` is missing.")
-                .fix("Give the id of a stored volume, or in `source` a series of an archive."));
-        }
+/// Refuses a job that has neither a volume nor a source, or both.
+fn require_input(volume: Option<&str>, source: Option<&SeriesSource>) -> Answer<()> {
+    match (volume, source) {
+        (None, None) => Err(Problem::invalid_field("volume", "`volume` is missing.")
+            .fix("Give the id of a stored volume, or in `source` a series of an archive.")),
         (Some(_), Some(_)) => {
             let both = "A job has a `volume` or a `source`, not both.";
-            return Err(Problem::invalid_field("source", both).fix("Leave one of them out."));
+            Err(Problem::invalid_field("source", both).fix("Leave one of them out."))
         }
-        (volume, _) => volume.map(str::to_owned),
-    };
-    let parameters = work.parameters_from_json(parameters_of(object)?)?;
-    // Last, since looking up the name of its host may take seconds.
-    order.webhook = webhook_of(app, object).await?;
-    Ok((work, volume, parameters))
+        _ => Ok(()),
+    }
 }
 
 /// A search for jobs.
@@ -162,9 +119,8 @@ pub struct JobQuery {
     /// Only jobs on this volume
     volume: Option<String>,
     /// Only jobs filed after this moment (RFC 3339)
-    #[serde(default, deserialize_with = "moment")]
     #[param(value_type = Option<String>, format = DateTime)]
-    created_after: Option<Timestamp>,
+    created_after: Option<Moment>,
 }
 
 /// List jobs
@@ -184,13 +140,10 @@ pub async fn list_jobs(
         volume: search.volume,
         tags: tags.filter(&app)?,
         scan: scan.into(),
-        created_after: search.created_after,
+        created_after: search.created_after.map(|moment| moment.0),
     };
     let page = page.charged().await?;
-    let table = app.service.queue().table();
-    let plan = table.plan_jobs(&filter, page).await?;
-    let page = charged_by_bytes(page, plan).await?;
-    let page = table.jobs(&filter, page).await?;
+    let page = app.service.jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, caller.scope, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
@@ -225,9 +178,10 @@ pub async fn get_job(
             ControlFlow::Break((ask_again, Json(body)).into_response())
         })
     };
-    let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
-    let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
+    let kept = app
+        .answers
+        .get(&app.service, asker, Resource::Job, &id, read);
     Ok(match kept.await? {
         ControlFlow::Continue(answer) => answer.answer(&headers),
         ControlFlow::Break(answer) => answer,
@@ -308,15 +262,13 @@ pub async fn delete_job(
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
-            return Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await);
+            return Err(missing(&app, tenant, Resource::Job, &id).await);
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
             return match app.service.delete_job(&caller.by, &id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-                _ => {
-                    Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await)
-                }
+                _ => Err(missing(&app, tenant, Resource::Job, &id).await),
             };
         }
     };
@@ -325,10 +277,8 @@ pub async fn delete_job(
 
 /// The tenant's job of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
-    let table = app.service.queue().table();
-    let job = read_row(|bytes| table.job_within(id, bytes)).await?;
-    match job.filter(|job| job.tenant == *tenant) {
+    match app.service.job(tenant, id).await? {
         Some(job) => Ok(job),
-        None => Err(missing(app.service.items().catalogue(), tenant, Resource::Job, id).await),
+        None => Err(missing(app, tenant, Resource::Job, id).await),
     }
 }

@@ -30,9 +30,6 @@ use ventriform_service::base::error::ServiceError;
 /// The media type of problem objects.
 pub const MEDIA_TYPE: &str = "application/problem+json";
 
-/// Pause before a change is sent again that others came before, seconds.
-const CONTENDED_RETRY_S: &str = "1";
-
 const TYPE_PREFIX: &str = "urn:ventriform:problem:";
 
 /// Why a request was not fulfilled (RFC 9457).
@@ -105,15 +102,6 @@ impl Problem {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-field", detail).at(field)
     }
 
-    /// 503: other requests change the same thing all the time, so that it was not changed.
-    pub fn contended(what: &str) -> Self {
-        let detail =
-            format!("Other requests change {what} at the same time, so that was not changed.");
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", detail)
-            .fix("Send the request again after the number of seconds in Retry-After.")
-            .header(header::RETRY_AFTER, CONTENDED_RETRY_S)
-    }
-
     /// 500. The cause goes to the log only.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
         ServiceError::internal(cause).into()
@@ -142,13 +130,6 @@ impl Problem {
             self.body.kind = format!("{TYPE_PREFIX}{code}");
             self.body.title = title(code);
         }
-        self
-    }
-
-    /// Makes a 422 about what is stored, not about the request, a 409.
-    #[must_use]
-    pub fn conflict(mut self) -> Self {
-        self.body.status = StatusCode::CONFLICT.as_u16();
         self
     }
 

@@ -2,18 +2,14 @@
 //! an otherwise good request names such a thing.
 
 use super::{Problem, shorten};
+use crate::app::App;
 use crate::wire::links::rfc3339;
 use axum::http::StatusCode;
-use ventriform_service::base::records::{Catalogue, Resource, Tenant, Timestamp};
+use ventriform_service::base::records::{Resource, Tenant, Timestamp};
 
 /// 410 if the tenant erased `id`, else 404.
-pub async fn missing(
-    catalogue: &dyn Catalogue,
-    tenant: &Tenant,
-    resource: Resource,
-    id: &str,
-) -> Problem {
-    match catalogue.erased_at(tenant, id).await {
+pub async fn missing(app: &App, tenant: &Tenant, resource: Resource, id: &str) -> Problem {
+    match app.service.erased_at(tenant, id).await {
         Ok(Some(at)) if Resource::from_id(id) == Some(resource) => erased(resource, id, at),
         Ok(_) => unknown_id(resource, id),
         Err(error) => error.into(),

@@ -98,8 +98,9 @@ async fn receive_parts(
         }
         charge(PART_MEMORY).await?;
         files += 1;
-        if files > app.service.settings.parts_limit {
-            return Err(body::too_many_files(app.service.settings.parts_limit));
+        let most = app.service.settings().parts_limit;
+        if files > most {
+            return Err(body::too_many_files(most));
         }
         let file_name = field.file_name().unwrap_or_default().to_ascii_lowercase();
         let pieces = field

@@ -53,9 +53,7 @@ pub async fn receive(
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::from_request(&request)?;
     app.service
-        .items()
-        .blobs()
-        .require_room(announced_length(request.headers()))?;
+        .require_disk_room(announced_length(request.headers()))?;
     let mut upload = Upload {
         volume: VolumeUpload::new(&app.service, &counting),
         others: BTreeMap::new(),

@@ -71,6 +71,16 @@ impl Agent {
         self
     }
 
+    /// Whose items its acts concern.
+    pub fn tenant(&self) -> &Tenant {
+        &self.who.tenant
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.who.agent
+    }
+
     /// Who it is, for an erasure, whose row is written together with its receipt.
     pub fn of_erasure(&self) -> ErasureAgent {
         ErasureAgent {

@@ -80,7 +80,7 @@ impl Queue {
     }
 
     /// The jobs table.
-    pub fn table(&self) -> &dyn JobStore {
+    pub(crate) fn table(&self) -> &dyn JobStore {
         &*self.jobs
     }
 

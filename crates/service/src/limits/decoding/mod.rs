@@ -32,7 +32,6 @@ mod turns;
 use crate::base::error::{Refusal, ServiceError};
 use crate::base::memory::Requester;
 use crate::base::records::{Failure, Fault};
-use crate::config::Settings;
 use crate::limits::places::{Place, Places, Rounds};
 use process_memory::process_memory;
 use prometheus::Histogram;
@@ -69,6 +68,19 @@ const BUSY_RETRY: Duration = Duration::from_secs(5);
 /// Memory of work that needs little, bytes. It bounds the number of threads.
 pub const LITTLE_MEMORY: u64 = 8 << 20;
 
+/// The limits of decoding.
+#[derive(Debug, Clone, Copy)]
+pub struct DecodingLimits {
+    /// Most memory of all work, bytes.
+    pub memory: u64,
+    /// Most pieces of work that wait.
+    pub queue: usize,
+    /// Longest time of a piece of work.
+    pub time: Duration,
+    /// Bytes of a file for which a second is added.
+    pub rate: u64,
+}
+
 /// The queue and the limits of decoding.
 pub struct Decoding {
     admission: Arc<Admission>,
@@ -84,25 +96,25 @@ pub struct Decoding {
 }
 
 impl Decoding {
-    /// With the operator's limits. `waits` takes the time until each piece of work begins, seconds.
-    pub fn new(settings: &Settings, waits: Histogram) -> Self {
+    /// With these limits. `waits` takes the time until each piece of work begins, seconds.
+    pub fn new(limits: DecodingLimits, waits: Histogram) -> Self {
         let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         Self {
             admission: Arc::new(Admission {
                 large: Places::new(1),
-                longest: settings.decoding_queue,
+                longest: limits.queue,
                 queue: Mutex::new(AdmissionQueue {
-                    free: settings.decoding_memory.0,
-                    share: settings.decoding_memory.0 / 2,
-                    group_share: settings.decoding_memory.0 / 4 * 3,
+                    free: limits.memory,
+                    share: limits.memory / 2,
+                    group_share: limits.memory / 4 * 3,
                     ..AdmissionQueue::default()
                 }),
             }),
             turns: Turns::new(cores),
             overruns: Arc::new(Semaphore::new(cores * OVERRUNS_PER_CORE)),
-            largest: largest_work(settings.decoding_memory.0, process_memory()),
-            time: settings.decoding_time.0,
-            rate: settings.decoding_rate.0.max(1),
+            largest: largest_work(limits.memory, process_memory()),
+            time: limits.time,
+            rate: limits.rate.max(1),
             waits,
         }
     }
@@ -600,18 +612,27 @@ fn busy() -> ServiceError {
 mod tests {
     use super::*;
     use crate::base::client::ClientAddress;
+    use crate::config::Size;
     use crate::telemetry::Metrics;
     use std::net::IpAddr;
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::mpsc;
 
+    /// The defaults of the settings.
+    const LIMITS: DecodingLimits = DecodingLimits {
+        memory: 256 << 20,
+        queue: 256,
+        time: Duration::from_secs(10),
+        rate: 1 << 20,
+    };
+
     fn decoding(memory: &str, queue: usize) -> Arc<Decoding> {
-        let settings = Settings {
-            decoding_memory: memory.parse().unwrap(),
-            decoding_queue: queue,
-            ..Settings::default()
+        let limits = DecodingLimits {
+            memory: memory.parse::<Size>().unwrap().0,
+            queue,
+            ..LIMITS
         };
-        let mut decoding = Decoding::new(&settings, Metrics::new().requests.decoding_waits);
+        let mut decoding = Decoding::new(limits, Metrics::new().requests.decoding_waits);
         decoding.turns = Turns::new(2);
         Arc::new(decoding)
     }
@@ -661,13 +682,12 @@ mod tests {
     /// A small file that is costly to decode states much memory.
     #[tokio::test(flavor = "multi_thread")]
     async fn time_is_given_for_the_bytes_of_a_file_and_not_for_memory() {
-        let settings = Settings {
-            decoding_memory: "1GiB".parse().unwrap(),
-            decoding_time: "100ms".parse().unwrap(),
-            decoding_rate: "1MiB".parse().unwrap(),
-            ..Settings::default()
+        let limits = DecodingLimits {
+            memory: 1 << 30,
+            time: Duration::from_millis(100),
+            ..LIMITS
         };
-        let decoding = Decoding::new(&settings, Metrics::new().requests.decoding_waits);
+        let decoding = Decoding::new(limits, Metrics::new().requests.decoding_waits);
         let compute = |monitor: &Monitor<'_>| {
             let end = Instant::now() + Duration::from_secs(20);
             while monitor.report(Stage::Read, 0.0).is_ok() && Instant::now() < end {

@@ -3,6 +3,8 @@
 //! In: the bytes, and the path of the value that is looked for. Out: that value. Everything else is parsed and dropped,
 //! so that memory is bounded by what is kept: a tree of JSON values has up to 50 times as many bytes as its text.
 
+use crate::base::error::AttemptError;
+use crate::base::records::Fault;
 use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Deserializer;
 use std::fmt;
@@ -230,4 +232,14 @@ impl<'de> Visitor<'de> for Listed<'_> {
         }
         Ok(texts)
     }
+}
+
+/// An archive's answer that is not what the standard asks for.
+pub(super) fn unexpected_answer(what: impl Into<String>) -> AttemptError {
+    AttemptError::permanent(
+        Fault::Service,
+        "archive-answer",
+        what,
+        "Ask the operator to compare `dicomweb` in the settings with the archive's documentation.",
+    )
 }

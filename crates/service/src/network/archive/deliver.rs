@@ -7,9 +7,9 @@
 
 use super::end::{ExchangeCounts, ExchangeEnd};
 use super::exchange::{Exchange, means};
-use super::trouble::Trouble;
 use super::web::Stored;
 use super::{DueSend, SendSettlement, dimse};
+use crate::base::error::AttemptError;
 use crate::base::records::{Job, JobState, StoreResult, Timestamp};
 use crate::callers::Agent;
 use crate::network::hooks::{AttemptEnd, DeliveryState, Errands, Lane, Rounds};
@@ -44,7 +44,7 @@ impl Deliverer {
         rounds.run(exchange.queue.changes(), end, grace).await;
     }
 
-    async fn send(&self, due: &DueSend) -> Result<Stored, Trouble> {
+    async fn send(&self, due: &DueSend) -> Result<Stored, AttemptError> {
         let exchange = &self.exchange;
         let archive = exchange.archive(&due.to, &due.tenant)?;
         let host = &exchange.host;
@@ -63,10 +63,10 @@ impl Deliverer {
                 let (peer, timeout) = (peer.clone(), exchange.settings.timeout);
                 let store = move || dimse::store(&peer, &object, timeout);
                 let stored = tokio::task::spawn_blocking(store).await;
-                stored.unwrap_or_else(|_| Err(Trouble::passing("The sending was broken off.")))
+                stored.unwrap_or_else(|_| Err(AttemptError::retry("The sending was broken off.")))
             }
             (None, Some(web)) => web.store(&object.bytes).await,
-            (None, None) => Err(Trouble::passing("The archive has no address any more.")),
+            (None, None) => Err(AttemptError::retry("The archive has no address any more.")),
         }
     }
 
@@ -74,7 +74,7 @@ impl Deliverer {
         &self,
         due: &DueSend,
         attempts: u32,
-        sent: Result<Stored, Trouble>,
+        sent: Result<Stored, AttemptError>,
     ) -> (SendSettlement, ExchangeEnd, AttemptEnd) {
         let done = |outcome, end| {
             let settlement = SendSettlement {
@@ -94,10 +94,12 @@ impl Deliverer {
         let meaning = means(&trouble);
         let again_after = |asked| self.exchange.again(attempts, due.since, asked);
         let again = match &trouble {
-            Trouble::Passing { asked, .. } => again_after(*asked),
+            AttemptError::Retry { asked, .. } => again_after(*asked),
             // The operator may correct the credentials.
-            Trouble::Final(failure) if failure.code == "archive-credentials" => again_after(None),
-            Trouble::Final(_) => None,
+            AttemptError::Permanent(failure) if failure.code == "archive-credentials" => {
+                again_after(None)
+            }
+            AttemptError::Permanent(_) => None,
         };
         let (state, end) = match again {
             Some(_) => (DeliveryState::Pending, ExchangeEnd::Failed),
@@ -106,10 +108,10 @@ impl Deliverer {
         let settlement = SendSettlement {
             state,
             outcome: match trouble {
-                Trouble::Passing { .. } => "failed",
-                Trouble::Final(_) => "refused",
+                AttemptError::Retry { .. } => "failed",
+                AttemptError::Permanent(_) => "refused",
             },
-            error: Some(trouble.what().to_owned()),
+            error: Some(trouble.why().to_owned()),
             again_at: again.map(|again| again.at),
             counts: again.is_none_or(|again| again.counts),
         };
@@ -139,7 +141,7 @@ impl Errands for Deliverer {
         let mut attempts = due.attempts;
         let sent = if attempts >= exchange.settings.retries.attempts {
             // The process ended during the last one.
-            Err(Trouble::passing(
+            Err(AttemptError::retry(
                 "How the last attempt ended was not written down.",
             ))
         } else {

@@ -1,9 +1,9 @@
 //! C-STORE to an archive without DICOMweb (PS3.4 annex B): one association for each object, over TLS if
 //! the settings say so. Called on blocking threads.
 
-use super::trouble::Trouble;
 use super::web::{Stored, store_failure};
 use super::{ArchiveObject, DicomPeer, DicomTls};
+use crate::base::error::AttemptError;
 use crate::base::pem;
 use crate::base::records::Fault;
 use dicom_core::{PrimitiveValue, VR, dicom_value};
@@ -37,7 +37,7 @@ pub(super) fn store(
     peer: &DicomPeer,
     object: &ArchiveObject,
     timeout: Duration,
-) -> Result<Stored, Trouble> {
+) -> Result<Stored, AttemptError> {
     let syntaxes = [
         uids::EXPLICIT_VR_LITTLE_ENDIAN,
         uids::IMPLICIT_VR_LITTLE_ENDIAN,
@@ -70,10 +70,10 @@ pub(super) fn store(
 fn send<S: CloseSocket + Read + Write>(
     mut association: ClientAssociation<S>,
     object: &ArchiveObject,
-) -> Result<Stored, Trouble> {
+) -> Result<Stored, AttemptError> {
     let context = association.presentation_contexts().first().cloned();
     let context = context.ok_or_else(unsupported)?;
-    let broken = |_| Trouble::passing("The archive broke the association off.");
+    let broken = |_| AttemptError::retry("The archive broke the association off.");
     let command = command(object)?;
     association
         .send(&Pdu::PData {
@@ -91,12 +91,12 @@ fn send<S: CloseSocket + Read + Write>(
         let written = writer.write_all(&data_set);
         written
             .and_then(|()| writer.finish())
-            .map_err(|_| Trouble::passing("The archive broke the association off."))?;
+            .map_err(|_| AttemptError::retry("The archive broke the association off."))?;
     }
     let mut response = Vec::new();
     loop {
         let Pdu::PData { data } = association.receive().map_err(broken)? else {
-            return Err(Trouble::passing("The archive ended the association."));
+            return Err(AttemptError::retry("The archive ended the association."));
         };
         let mut last = false;
         for value in data {
@@ -104,7 +104,7 @@ fn send<S: CloseSocket + Read + Write>(
             last |= value.is_last;
         }
         if response.len() > RESPONSE_BYTES {
-            return Err(Trouble::passing("The archive's response has no end."));
+            return Err(AttemptError::retry("The archive's response has no end."));
         }
         if last {
             break;
@@ -121,16 +121,16 @@ fn send<S: CloseSocket + Read + Write>(
 }
 
 /// TLS with the files of the settings, which are read each time: they may have been renewed.
-fn client_config(files: &DicomTls) -> Result<ClientConfig, Trouble> {
+fn client_config(files: &DicomTls) -> Result<ClientConfig, AttemptError> {
     let unusable = |key: &str, path: &Path, reason: String| {
         let path = path.display();
-        Trouble::passing(format!("`{key}` ({path}) cannot be used: {reason}."))
+        AttemptError::retry(format!("`{key}` ({path}) cannot be used: {reason}."))
     };
     let authorities = pem::authorities(&files.ca_file)
         .map_err(|reason| unusable("dicom_ca_file", &files.ca_file, reason))?;
     let builder = ClientConfig::builder_with_provider(pem::provider())
         .with_protocol_versions(&pem::TLS_VERSIONS)
-        .map_err(|error| Trouble::passing(format!("TLS cannot be used: {error}.")))?
+        .map_err(|error| AttemptError::retry(format!("TLS cannot be used: {error}.")))?
         .with_root_certificates(authorities);
     let Some((certificate, key)) = &files.own else {
         return Ok(builder.with_no_client_auth());
@@ -143,25 +143,27 @@ fn client_config(files: &DicomTls) -> Result<ClientConfig, Trouble> {
         .map_err(|error| unusable("dicom_cert_file", certificate, error.to_string()))
 }
 
-fn refusal(error: &Error) -> Trouble {
+fn refusal(error: &Error) -> AttemptError {
     match error {
         Error::TlsHandshake { .. }
         | Error::TlsConnection { .. }
-        | Error::InvalidServerName { .. } => Trouble::passing(
+        | Error::InvalidServerName { .. } => AttemptError::retry(
             "The archive and this service do not agree on TLS: check `dicom_ca_file`, the name \
                  in the archive's certificate, and whether it asks for a certificate of this service.",
         ),
-        Error::TlsNotSupported => Trouble::passing("The archive speaks TLS: set `dicom_ca_file`."),
+        Error::TlsNotSupported => {
+            AttemptError::retry("The archive speaks TLS: set `dicom_ca_file`.")
+        }
         Error::Rejected { .. } => {
-            Trouble::passing("The archive rejects the association: check both AE titles.")
+            AttemptError::retry("The archive rejects the association: check both AE titles.")
         }
         Error::NoAcceptedPresentationContexts { .. } => unsupported(),
-        _ => Trouble::passing("The archive could not be reached, or broke the association off."),
+        _ => AttemptError::retry("The archive could not be reached, or broke the association off."),
     }
 }
 
-fn unsupported() -> Trouble {
-    Trouble::lasting(
+fn unsupported() -> AttemptError {
+    AttemptError::permanent(
         Fault::Service,
         "archive-refuses",
         "The archive does not support the SOP class of the object.",
@@ -169,8 +171,8 @@ fn unsupported() -> Trouble {
     )
 }
 
-fn broken_object() -> Trouble {
-    Trouble::lasting(
+fn broken_object() -> AttemptError {
+    AttemptError::permanent(
         Fault::Service,
         "internal",
         "The object cannot be encoded for the archive.",
@@ -179,7 +181,7 @@ fn broken_object() -> Trouble {
 }
 
 /// The command set of C-STORE-RQ (PS3.7, 9.3.1).
-fn command(object: &ArchiveObject) -> Result<Vec<u8>, Trouble> {
+fn command(object: &ArchiveObject) -> Result<Vec<u8>, AttemptError> {
     let number = |tag, value: u16| InMemElement::new(tag, VR::US, dicom_value!(U16, [value]));
     let text = |tag, value: &str| InMemElement::new(tag, VR::UI, PrimitiveValue::from(value));
     let command = InMemDicomObject::command_from_element_iter([
@@ -200,7 +202,7 @@ fn command(object: &ArchiveObject) -> Result<Vec<u8>, Trouble> {
 }
 
 /// The data set in the transfer syntax that was agreed on.
-fn data_set(object: &ArchiveObject, syntax: &str) -> Result<Vec<u8>, Trouble> {
+fn data_set(object: &ArchiveObject, syntax: &str) -> Result<Vec<u8>, AttemptError> {
     let file = OpenFileOptions::new().from_reader(object.bytes.as_slice());
     let file = file.map_err(|_| broken_object())?;
     let syntax = TransferSyntaxRegistry

@@ -1,8 +1,8 @@
 //! The common parts of fetching and delivering.
 
-use super::trouble::Trouble;
 use super::web::WebClients;
 use super::{Archive, ArchiveStore, Archives, ExchangeHost};
+use crate::base::error::AttemptError;
 use crate::base::http_client::ClientFactory;
 use crate::base::records::{Clock, Tenant, Timestamp};
 use crate::jobs::Queue;
@@ -69,10 +69,10 @@ impl Exchange {
     }
 
     /// The configured archive of that name.
-    pub(super) fn archive(&self, name: &str, tenant: &Tenant) -> Result<&Archive, Trouble> {
+    pub(super) fn archive(&self, name: &str, tenant: &Tenant) -> Result<&Archive, AttemptError> {
         let archive = self.settings.archives.named(name, tenant);
         archive.ok_or_else(|| {
-            Trouble::passing(format!("The settings have no archive `{name}` any more."))
+            AttemptError::retry(format!("The settings have no archive `{name}` any more."))
         })
     }
 
@@ -91,18 +91,18 @@ impl Exchange {
     /// Limits the time of an attempt.
     pub(super) async fn in_time<T>(
         &self,
-        attempt: impl Future<Output = Result<T, Trouble>> + Send,
-    ) -> Result<T, Trouble> {
+        attempt: impl Future<Output = Result<T, AttemptError>> + Send,
+    ) -> Result<T, AttemptError> {
         let ended = tokio::time::timeout(self.settings.time_limit, attempt).await;
-        ended.unwrap_or_else(|_| Err(Trouble::passing("The transfer took too long.")))
+        ended.unwrap_or_else(|_| Err(AttemptError::retry("The transfer took too long.")))
     }
 }
 
 /// Consequences of an attempt that failed so for others to the same archive.
-pub(super) fn means(trouble: &Trouble) -> AttemptEnd {
+pub(super) fn means(trouble: &AttemptError) -> AttemptEnd {
     match trouble {
-        Trouble::Passing { asked, .. } => AttemptEnd::Failing(*asked),
+        AttemptError::Retry { asked, .. } => AttemptEnd::Failing(*asked),
         // The archive works; it does not have or take this one thing.
-        Trouble::Final(_) => AttemptEnd::Fine,
+        AttemptError::Permanent(_) => AttemptEnd::Fine,
     }
 }

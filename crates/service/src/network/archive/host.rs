@@ -2,7 +2,7 @@
 
 use super::ArchiveObject;
 use super::parts::SeriesParts;
-use super::trouble::Trouble;
+use crate::base::error::AttemptError;
 use crate::base::records::Tenant;
 use crate::callers::Agent;
 use crate::items::Pin;
@@ -20,10 +20,18 @@ pub struct StoredSeries {
 #[async_trait]
 pub trait ExchangeHost: Send + Sync + 'static {
     /// Stores the files of a series as a volume, as if the tenant had uploaded them.
-    async fn store(&self, tenant: &Tenant, parts: SeriesParts) -> Result<StoredSeries, Trouble>;
+    async fn store(
+        &self,
+        tenant: &Tenant,
+        parts: SeriesParts,
+    ) -> Result<StoredSeries, AttemptError>;
 
     /// The tenant's volume of that id, if it is complete.
-    async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble>;
+    async fn held(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+    ) -> Result<Option<StoredSeries>, AttemptError>;
 
     /// An object of a result.
     async fn object(
@@ -31,7 +39,7 @@ pub trait ExchangeHost: Send + Sync + 'static {
         tenant: &Tenant,
         result: &str,
         name: &str,
-    ) -> Result<ArchiveObject, Trouble>;
+    ) -> Result<ArchiveObject, AttemptError>;
 
     /// Who fetches and delivers for `tenant`, by the audit trail.
     fn agent(&self, tenant: &Tenant) -> Agent;

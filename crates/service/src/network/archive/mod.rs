@@ -12,7 +12,7 @@
 //! 2. When a job with a [`send`](crate::base::records::Job::send) succeeds, the same transaction writes a row
 //!    for each object (the outbox). [`Deliverer`] makes the object from the stored result, asks the
 //!    archive whether it has it, and sends it: by STOW-RS, or by C-STORE to an archive with `dicom`.
-//! 3. What may pass ([`Trouble::Passing`]) is tried again later and later, across restarts; the rest
+//! 3. What may pass ([`AttemptError::Retry`](crate::base::error::AttemptError::Retry)) is tried again later and later, across restarts; the rest
 //!    fails the job, or ends the delivery, with its reason.
 //!
 //! Guaranteed: a result is delivered or its reason is shown, whatever is killed in between; an object
@@ -35,7 +35,6 @@
 mod answer;
 mod deliver;
 mod description;
-mod desk;
 mod dimse;
 mod end;
 mod exchange;
@@ -46,12 +45,10 @@ mod pieces;
 mod pull;
 mod record;
 mod related;
-mod trouble;
 mod web;
 
 pub use deliver::Deliverer;
 pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer, DicomTls};
-pub use desk::{ArchiveDesk, ArchiveReadings};
 pub use end::{ExchangeCounts, ExchangeEnd};
 pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};
@@ -64,4 +61,57 @@ pub use record::{
     SendSettlement, SeriesKey,
 };
 pub use related::RelatedType;
-pub use trouble::Trouble;
+
+use crate::base::records::StoreResult;
+use crate::network::hooks::UrlGuard;
+use std::sync::Arc;
+use tokio::sync::Notify;
+
+/// The archives of a service.
+pub struct ArchiveDesk {
+    /// The tables.
+    pub(crate) store: Arc<dyn ArchiveStore>,
+    /// Which DICOMweb services jobs may name beside the configured archives.
+    pub(crate) guard: UrlGuard,
+    /// Told when a delivery is due at once.
+    pub(crate) woken: Arc<Notify>,
+    /// Attempts to fetch.
+    pub(crate) pulls: Arc<ExchangeCounts>,
+    /// Attempts to deliver.
+    pub(crate) sends: Arc<ExchangeCounts>,
+}
+
+/// Figures of archives for operators.
+pub struct ArchiveReadings<'a> {
+    /// The exchanges that wait.
+    pub(crate) backlog: ArchiveBacklog,
+    /// Attempts to fetch.
+    pub(crate) pulls: &'a ExchangeCounts,
+    /// Attempts to deliver.
+    pub(crate) sends: &'a ExchangeCounts,
+}
+
+impl ArchiveDesk {
+    /// The archives of a service that starts now. `guard` knows the DICOMweb services that jobs may name.
+    pub fn new(store: Arc<dyn ArchiveStore>, guard: UrlGuard) -> Self {
+        Self {
+            store,
+            guard,
+            woken: Arc::default(),
+            pulls: Arc::default(),
+            sends: Arc::default(),
+        }
+    }
+
+    /// Figures for operators.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn read(&self) -> StoreResult<ArchiveReadings<'_>> {
+        Ok(ArchiveReadings {
+            backlog: self.store.archive_backlog().await?,
+            pulls: &self.pulls,
+            sends: &self.sends,
+        })
+    }
+}

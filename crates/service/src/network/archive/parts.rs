@@ -1,9 +1,10 @@
 //! The files of a series on their way from an archive: `multipart/related` (PS3.18, 8.7.1), read
 //! part by part within limits.
 
+use super::answer::unexpected_answer;
 use super::pieces::{EndlessHeader, Unparsed};
 use super::related::RelatedType;
-use super::trouble::{Trouble, odd_answer};
+use crate::base::error::AttemptError;
 use crate::base::http_client::ByteStream;
 use crate::base::records::Fault;
 use futures::{Stream, StreamExt};
@@ -37,12 +38,14 @@ impl SeriesParts {
         content_type: &str,
         body: ByteStream,
         limits: PartLimits,
-    ) -> Result<Self, Trouble> {
+    ) -> Result<Self, AttemptError> {
         let related = RelatedType::parse(content_type);
         let boundary = related
             .and_then(|related| related.boundary)
             .ok_or_else(|| {
-                odd_answer("The archive's answer is no `multipart/related` with DICOM files.")
+                unexpected_answer(
+                    "The archive's answer is no `multipart/related` with DICOM files.",
+                )
             })?;
         let unparsed = Unparsed::default();
         let body = unparsed.pieces(body);
@@ -60,11 +63,11 @@ impl SeriesParts {
     ///
     /// # Errors
     /// If the answer is cut off or malformed, or there are too many files.
-    pub async fn next(&mut self) -> Result<Option<SeriesPart>, Trouble> {
+    pub async fn next(&mut self) -> Result<Option<SeriesPart>, AttemptError> {
         let next = self.multipart.next_field().await;
         let Some(field) = next.map_err(|error| self.trouble(&error))? else {
             return match self.seen {
-                0 => Err(odd_answer("The archive answered without a file.")),
+                0 => Err(unexpected_answer("The archive answered without a file.")),
                 _ => Ok(None),
             };
         };
@@ -83,7 +86,7 @@ impl SeriesParts {
         }))
     }
 
-    fn trouble(&self, error: &multer::Error) -> Trouble {
+    fn trouble(&self, error: &multer::Error) -> AttemptError {
         trouble(error, self.limits)
     }
 }
@@ -96,7 +99,7 @@ pub struct SeriesPart {
 }
 
 impl Stream for SeriesPart {
-    type Item = Result<bytes::Bytes, Trouble>;
+    type Item = Result<bytes::Bytes, AttemptError>;
 
     fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         let piece = std::task::ready!(self.field.poll_next_unpin(context));
@@ -106,23 +109,25 @@ impl Stream for SeriesPart {
     }
 }
 
-fn trouble(error: &multer::Error, limits: PartLimits) -> Trouble {
+fn trouble(error: &multer::Error, limits: PartLimits) -> AttemptError {
     match error {
         multer::Error::StreamSizeExceeded { .. } | multer::Error::FieldSizeExceeded { .. } => {
             too_large(format!("The series is larger than {} bytes.", limits.bytes))
         }
-        multer::Error::StreamReadFailed(cause) if cause.is::<EndlessHeader>() => {
-            odd_answer("The archive's answer is malformed: a header or boundary does not end.")
-        }
+        multer::Error::StreamReadFailed(cause) if cause.is::<EndlessHeader>() => unexpected_answer(
+            "The archive's answer is malformed: a header or boundary does not end.",
+        ),
         multer::Error::StreamReadFailed(_) => {
-            Trouble::passing("The connection to the archive broke off in its answer.")
+            AttemptError::retry("The connection to the archive broke off in its answer.")
         }
-        _ => odd_answer("The archive's answer is malformed: its parts have no proper boundaries."),
+        _ => unexpected_answer(
+            "The archive's answer is malformed: its parts have no proper boundaries.",
+        ),
     }
 }
 
-fn too_large(what: String) -> Trouble {
-    Trouble::lasting(
+fn too_large(what: String) -> AttemptError {
+    AttemptError::permanent(
         Fault::TooLarge,
         "too-large",
         what,
@@ -141,7 +146,7 @@ mod tests {
         parts: 2,
     };
 
-    async fn read(content_type: &str, body: &str) -> Result<Vec<String>, Trouble> {
+    async fn read(content_type: &str, body: &str) -> Result<Vec<String>, AttemptError> {
         let pieces: Vec<_> = body
             .as_bytes()
             .chunks(7)
@@ -197,7 +202,9 @@ mod tests {
             ),
         ] {
             match read(content_type, &body).await {
-                Err(Trouble::Final(failure)) => assert_eq!(failure.code, code, "{failure:?}"),
+                Err(AttemptError::Permanent(failure)) => {
+                    assert_eq!(failure.code, code, "{failure:?}")
+                }
                 other => panic!("{content_type}: {other:?}"),
             }
         }

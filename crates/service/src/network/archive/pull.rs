@@ -4,9 +4,9 @@ use super::end::{ExchangeCounts, ExchangeEnd};
 use super::exchange::{Exchange, means};
 use super::host::StoredSeries;
 use super::parts::PartLimits;
-use super::trouble::Trouble;
 use super::web::DicomWeb;
 use super::{DuePull, HeldSeries, SeriesKey};
+use crate::base::error::AttemptError;
 use crate::base::records::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
 use crate::callers::Agent;
 use crate::network::hooks::{AttemptEnd, Errands, Lane, Rounds};
@@ -41,7 +41,7 @@ impl Puller {
     }
 
     /// Fetches a series, or finds that it is held already.
-    async fn fetch(&self, due: &DuePull) -> Result<(StoredSeries, ExchangeEnd), Trouble> {
+    async fn fetch(&self, due: &DuePull) -> Result<(StoredSeries, ExchangeEnd), AttemptError> {
         let exchange = &self.exchange;
         let now = exchange.clock().now();
         let source = &due.source;
@@ -90,7 +90,7 @@ impl Puller {
         &self,
         due: &DuePull,
         attempts: u32,
-        fetched: Result<(StoredSeries, ExchangeEnd), Trouble>,
+        fetched: Result<(StoredSeries, ExchangeEnd), AttemptError>,
     ) -> StoreResult<(ExchangeEnd, AttemptEnd)> {
         let (exchange, store) = (&self.exchange, &self.exchange.store);
         let now = exchange.clock().now();
@@ -108,16 +108,18 @@ impl Puller {
             Err(trouble) => trouble,
         };
         let meaning = means(&trouble);
-        tracing::info!(job = %due.job, error = trouble.what(), "a series was not fetched");
+        tracing::info!(job = %due.job, error = trouble.why(), "a series was not fetched");
         let failure = match trouble {
-            Trouble::Passing { what, asked } => match exchange.again(attempts, due.since, asked) {
-                Some(again) => {
-                    store.pull_failed(&due.job, &what, again, now).await?;
-                    return Ok((ExchangeEnd::Failed, meaning));
+            AttemptError::Retry { why, asked } => {
+                match exchange.again(attempts, due.since, asked) {
+                    Some(again) => {
+                        store.pull_failed(&due.job, &why, again, now).await?;
+                        return Ok((ExchangeEnd::Failed, meaning));
+                    }
+                    None => unavailable(attempts, &why),
                 }
-                None => unavailable(attempts, &what),
-            },
-            Trouble::Final(failure) => failure,
+            }
+            AttemptError::Permanent(failure) => failure,
         };
         let given_up = store.pull_given_up(&due.job, &failure, now);
         if let Some(job) = Agent::scope(self.agent(due), given_up).await? {
@@ -150,7 +152,7 @@ impl Puller {
 }
 
 /// A hash of the SOP Instance UIDs of a series; `None` if the archive does not list them.
-async fn instances(web: &DicomWeb, key: SeriesKey<'_>) -> Result<Option<String>, Trouble> {
+async fn instances(web: &DicomWeb, key: SeriesKey<'_>) -> Result<Option<String>, AttemptError> {
     let listed = web.instances(key.study, key.series).await?;
     Ok(listed.filter(|uids| !uids.is_empty()).map(|mut uids| {
         uids.sort_unstable();
@@ -187,7 +189,7 @@ impl Errands for Puller {
         let mut attempts = due.attempts;
         let fetched = if attempts >= exchange.settings.retries.attempts {
             // The process ended during the last one.
-            Err(Trouble::passing(
+            Err(AttemptError::retry(
                 "How the last one ended was not written down.",
             ))
         } else {

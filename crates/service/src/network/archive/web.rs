@@ -3,11 +3,12 @@
 //! Redirects are followed within the archive's own scheme, host and port only. For a URL without a
 //! configured archive, connections go to the addresses that the guard has checked.
 
+use super::answer::unexpected_answer;
 use super::answer::{Read, Step, find, listed};
 use super::parts::{PartLimits, SeriesParts};
-use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
 use crate::base::dicom_tags::{FAILED_SOP_SEQUENCE, FAILURE_REASON, SOP_INSTANCE_UID};
+use crate::base::error::AttemptError;
 use crate::base::http_client::{
     ByteStream, ClientError, ClientFactory, ClientOptions, HttpClient, Redirects, SendError,
     USER_AGENT, bounded_body, build_client, request_uri,
@@ -104,9 +105,13 @@ impl WebClients {
     ///
     /// # Errors
     /// If it has none, or the file of its authorities cannot be read.
-    pub async fn client(&self, archive: &Archive, now: Timestamp) -> Result<DicomWeb, Trouble> {
+    pub async fn client(
+        &self,
+        archive: &Archive,
+        now: Timestamp,
+    ) -> Result<DicomWeb, AttemptError> {
         let base = archive.dicomweb.clone().ok_or_else(|| {
-            Trouble::passing("The archive has no `dicomweb` in the settings any more.")
+            AttemptError::retry("The archive has no `dicomweb` in the settings any more.")
         })?;
         let client = match self.known(&archive.name) {
             Some(client) => client,
@@ -135,9 +140,9 @@ impl WebClients {
     ///
     /// # Errors
     /// If the guard does not let it pass.
-    pub async fn at(&self, url: &str, now: Timestamp) -> Result<DicomWeb, Trouble> {
+    pub async fn at(&self, url: &str, now: Timestamp) -> Result<DicomWeb, AttemptError> {
         let checked = self.guard.resolve(url).await.map_err(|refusal| {
-            Trouble::lasting(
+            AttemptError::permanent(
                 Fault::Request,
                 "invalid-field",
                 format!("Nothing can be fetched from the source's URL. {refusal}"),
@@ -184,13 +189,13 @@ impl WebClients {
         &self,
         name: &str,
         options: ClientOptions,
-    ) -> Result<Arc<dyn HttpClient>, Trouble> {
+    ) -> Result<Arc<dyn HttpClient>, AttemptError> {
         let built = build_client(self.factory.clone(), options).await;
         let client = built.map_err(|error| match error {
             ClientError::Authorities(_) => unusable_authorities(name, &error),
             ClientError::Client(_) => {
                 tracing::error!(%error, "archives cannot be reached");
-                Trouble::passing("The connection to the archive could not be set up.")
+                AttemptError::retry("The connection to the archive could not be set up.")
             }
         })?;
         let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
@@ -199,10 +204,10 @@ impl WebClients {
     }
 }
 
-fn unusable_authorities(archive: &str, error: &dyn std::error::Error) -> Trouble {
+fn unusable_authorities(archive: &str, error: &dyn std::error::Error) -> AttemptError {
     let error = error.to_string();
     tracing::error!(archive, error, "ca_file is unusable");
-    Trouble::passing("The file `ca_file` of the archive cannot be used.")
+    AttemptError::retry("The file `ca_file` of the archive cannot be used.")
 }
 
 impl DicomWeb {
@@ -220,7 +225,7 @@ impl DicomWeb {
         &self,
         study: &str,
         series: &str,
-    ) -> Result<Option<Vec<String>>, Trouble> {
+    ) -> Result<Option<Vec<String>>, AttemptError> {
         self.search(&format!("studies/{study}/series/{series}/instances"))
             .await
     }
@@ -229,14 +234,14 @@ impl DicomWeb {
     ///
     /// # Errors
     /// If the archive does not answer.
-    pub async fn has(&self, study: &str, instance: &str) -> Result<Option<bool>, Trouble> {
+    pub async fn has(&self, study: &str, instance: &str) -> Result<Option<bool>, AttemptError> {
         let path = format!("studies/{study}/instances?SOPInstanceUID={instance}");
         let found = self.search(&path).await?;
         Ok(found.map(|found| found.iter().any(|uid| uid == instance)))
     }
 
     /// The SOP Instance UIDs that a search finds.
-    async fn search(&self, path: &str) -> Result<Option<Vec<String>>, Trouble> {
+    async fn search(&self, path: &str) -> Result<Option<Vec<String>>, AttemptError> {
         let headers = [(ACCEPT, DICOM_JSON)];
         let answer = self.send(Method::GET, path, &headers, Bytes::new()).await?;
         match answer.status() {
@@ -263,7 +268,7 @@ impl DicomWeb {
         study: &str,
         series: &str,
         limits: PartLimits,
-    ) -> Result<SeriesParts, Trouble> {
+    ) -> Result<SeriesParts, AttemptError> {
         let path = format!("studies/{study}/series/{series}");
         let headers = [(
             ACCEPT,
@@ -276,7 +281,7 @@ impl DicomWeb {
         if status != StatusCode::OK {
             return Err(match status {
                 StatusCode::NOT_FOUND | StatusCode::GONE | StatusCode::NO_CONTENT => {
-                    Trouble::lasting(
+                    AttemptError::permanent(
                         Fault::Content,
                         "no-such-series",
                         "The archive has no such series.",
@@ -289,7 +294,7 @@ impl DicomWeb {
         }
         let length = text(answer.headers(), CONTENT_LENGTH.as_str()).parse::<u64>();
         if length.is_ok_and(|length| length > limits.bytes) {
-            return Err(Trouble::lasting(
+            return Err(AttemptError::permanent(
                 Fault::TooLarge,
                 "too-large",
                 format!("The series is larger than {} bytes.", limits.bytes),
@@ -304,7 +309,7 @@ impl DicomWeb {
     ///
     /// # Errors
     /// If the archive does not take it, or does not answer.
-    pub async fn store(&self, object: &[u8]) -> Result<Stored, Trouble> {
+    pub async fn store(&self, object: &[u8]) -> Result<Stored, AttemptError> {
         let head = format!("--{PART_BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
         let tail = format!("\r\n--{PART_BOUNDARY}--\r\n");
         let body = [head.as_bytes(), object, tail.as_bytes()].concat();
@@ -329,7 +334,7 @@ impl DicomWeb {
         path: &str,
         headers: &[(HeaderName, &str)],
         body: Bytes,
-    ) -> Result<Response<ByteStream>, Trouble> {
+    ) -> Result<Response<ByteStream>, AttemptError> {
         let sent = async {
             let uri = request_uri(&format!("{}/{path}", self.base))?;
             let unusable = |error: http::Error| SendError::Request(error.to_string());
@@ -345,7 +350,7 @@ impl DicomWeb {
                 .await
         };
         sent.await.map_err(|error| {
-            Trouble::passing(match error {
+            AttemptError::retry(match error {
                 SendError::Timeout => "The archive did not answer in time.",
                 _ => "The archive could not be reached, or broke the connection off.",
             })
@@ -382,7 +387,7 @@ fn uids(answer: &[u8], most: usize) -> Option<Vec<String>> {
 
 /// The outcome for the only object in an answer to STOW-RS (PS3.18, 10.5.3; Store Instances Response
 /// Module, PS3.18 annex I).
-fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
+fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, AttemptError> {
     /// To the reason why the first object failed. The first steps lead to that object.
     const REASON: [Step; 6] = [
         Step::Member(FAILED_SOP_SEQUENCE),
@@ -409,7 +414,7 @@ fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
             if said {
                 Ok(Stored::Now)
             } else {
-                Err(Trouble::passing(
+                Err(AttemptError::retry(
                     "The archive did not say whether it has stored the object.",
                 ))
             }
@@ -425,10 +430,10 @@ fn is_xml_without_failure(answer: &[u8]) -> bool {
 }
 
 /// The meaning of a Failure Reason of STOW-RS or a status of C-STORE (PS3.3 C.14, PS3.4 B.2.3).
-pub(super) fn store_failure(reason: Option<u16>) -> Result<Stored, Trouble> {
+pub(super) fn store_failure(reason: Option<u16>) -> Result<Stored, AttemptError> {
     let refuses = |what: &str| {
         let code = reason.unwrap_or_default();
-        Trouble::lasting(
+        AttemptError::permanent(
             Fault::Service,
             "archive-refuses",
             format!("The archive does not take the object: {what} (reason {code:04X}H)."),
@@ -440,13 +445,15 @@ pub(super) fn store_failure(reason: Option<u16>) -> Result<Stored, Trouble> {
         Some(0x0122 | 0xA800) => Err(refuses("it does not support the SOP class")),
         Some(0xA900..=0xA9FF) => Err(refuses("the data set does not match the SOP class")),
         Some(0xC000..=0xCFFF) => Err(refuses("it cannot understand the data set")),
-        Some(0x0124) => Err(Trouble::passing(
+        Some(0x0124) => Err(AttemptError::retry(
             "The archive does not allow this service to store (reason 0124H).",
         )),
-        Some(code) => Err(Trouble::passing(format!(
+        Some(code) => Err(AttemptError::retry(format!(
             "The archive could not store the object (reason {code:04X}H)."
         ))),
-        None => Err(Trouble::passing("The archive could not store the object.")),
+        None => Err(AttemptError::retry(
+            "The archive could not store the object.",
+        )),
     }
 }
 
@@ -455,15 +462,15 @@ fn may_pass(status: StatusCode) -> bool {
     status.is_server_error() || matches!(status.as_u16(), 408 | 425 | 429)
 }
 
-fn busy(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
-    Trouble::Passing {
-        what: format!("The archive answered with status {}.", status.as_u16()),
+fn busy(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> AttemptError {
+    AttemptError::Retry {
+        why: format!("The archive answered with status {}.", status.as_u16()),
         asked: retry_after(headers, now),
     }
 }
 
-fn unauthorised() -> Trouble {
-    Trouble::Final(
+fn unauthorised() -> AttemptError {
+    AttemptError::Permanent(
         Failure::new(
             Fault::Service,
             "archive-credentials",
@@ -476,14 +483,14 @@ fn unauthorised() -> Trouble {
     )
 }
 
-fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
+fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> AttemptError {
     match status {
         StatusCode::UNAUTHORIZED => unauthorised(),
         status if may_pass(status) => busy(status, headers, now),
         status if status.is_redirection() => {
-            odd_answer("The archive sends elsewhere (redirect), which is not followed.")
+            unexpected_answer("The archive sends elsewhere (redirect), which is not followed.")
         }
-        status => Trouble::lasting(
+        status => AttemptError::permanent(
             Fault::Service,
             "archive-refuses",
             format!(
@@ -496,11 +503,14 @@ fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
 }
 
 /// The body of an answer, if it has no more than `most` bytes.
-async fn limited(answer: Response<ByteStream>, most: usize) -> Result<Vec<u8>, Trouble> {
+async fn limited(answer: Response<ByteStream>, most: usize) -> Result<Vec<u8>, AttemptError> {
     let read = bounded_body(answer.into_body(), most).await;
-    let read = read
-        .map_err(|_| Trouble::passing("The connection to the archive broke off in its answer."))?;
-    read.ok_or_else(|| odd_answer(format!("The archive's answer has more than {most} bytes.")))
+    let read = read.map_err(|_| {
+        AttemptError::retry("The connection to the archive broke off in its answer.")
+    })?;
+    read.ok_or_else(|| {
+        unexpected_answer(format!("The archive's answer has more than {most} bytes."))
+    })
 }
 
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
@@ -554,18 +564,21 @@ mod tests {
         assert_eq!(judge(409, &failed(0x0111)).unwrap(), Stored::Before);
         for status in [200, 202, 409] {
             let refused = judge(status, &failed(0xC000)).unwrap_err();
-            assert!(refused.what().contains("C000H"));
-            assert!(matches!(refused, Trouble::Final(_)));
+            assert!(refused.why().contains("C000H"));
+            assert!(matches!(refused, AttemptError::Permanent(_)));
             let full = judge(status, &failed(0xA700)).unwrap_err();
-            assert!(matches!(full, Trouble::Passing { .. }), "{full:?}");
+            assert!(matches!(full, AttemptError::Retry { .. }), "{full:?}");
         }
-        assert!(matches!(judge(202, "<xml/>"), Err(Trouble::Passing { .. })));
-        assert!(matches!(judge(409, ""), Err(Trouble::Passing { .. })));
+        assert!(matches!(
+            judge(202, "<xml/>"),
+            Err(AttemptError::Retry { .. })
+        ));
+        assert!(matches!(judge(409, ""), Err(AttemptError::Retry { .. })));
         // A failure is one, however odd its description is.
         for odd in ["null", "{}", "7", r#"{"00081197": {"Value": ["x"]}}"#] {
             let body = format!(r#"{{"00081198": {{"Value": [{odd}]}}}}"#);
             let unsaid = judge(200, &body).unwrap_err();
-            assert!(matches!(unsaid, Trouble::Passing { .. }), "{odd}");
+            assert!(matches!(unsaid, AttemptError::Retry { .. }), "{odd}");
         }
     }
 

@@ -31,7 +31,6 @@
 //! | `sender`, `outcome`, `dispatcher` | one attempt and how it ends; all of them |
 //! | `rounds` | the loop over a table of what is due; that of [`crate::network::archive`] too |
 
-mod desk;
 mod dispatcher;
 mod event;
 mod guard;
@@ -44,7 +43,6 @@ mod schedule;
 mod secret;
 mod sender;
 
-pub use desk::Hooks;
 pub use dispatcher::{DeliveryCounts, Dispatcher, HookSettings};
 pub use event::HookEvent;
 pub use guard::{AllowList, CheckedUrl, Pin, PinnedNames, UrlGuard, UrlRefusal};
@@ -59,3 +57,15 @@ pub use rounds::{AttemptEnd, Errands, Rounds, random_share};
 pub use schedule::{NextAttempt, RetrySchedule};
 pub use secret::{InvalidSecret, SigningSecret, signature_header};
 pub use sender::{Sender, retry_after};
+
+use std::sync::Arc;
+
+/// The webhooks of a service.
+pub struct Hooks {
+    /// The tables.
+    pub(crate) store: Arc<dyn DeliveryStore>,
+    /// Which URLs may be told.
+    pub(crate) guard: UrlGuard,
+    /// Sends deliveries.
+    pub(crate) dispatcher: Arc<Dispatcher>,
+}

@@ -11,10 +11,10 @@ use super::observer::IntakeObserver;
 use super::record::{GroupState, IntakeGroup, IntakeStore, Origin, ReceivedFiles};
 use super::rules::Rule;
 use super::session::Sessions;
-use crate::base::error::ServiceError;
+use crate::base::error::AttemptError;
 use crate::base::records::{
-    BlobError, ErasureAgent, ErasureReason, Failure, Fault, LocalFile, StoreError, StoreFault,
-    StoreResult, milliseconds,
+    BlobError, ErasureAgent, ErasureReason, Fault, LocalFile, StoreError, StoreFault, StoreResult,
+    milliseconds,
 };
 use crate::jobs::Queue;
 use async_trait::async_trait;
@@ -40,47 +40,21 @@ const SWEEP_EVERY: Duration = Duration::from_secs(600);
 /// A file without a row that was written this long ago will not get one.
 const ABANDONED_AFTER: Duration = Duration::from_secs(3600);
 
-/// Why a step could not be done.
-#[derive(Debug)]
-pub enum MakeError {
-    /// It may be possible later.
-    Later(String),
-    /// It is never possible.
-    Never(Failure),
-}
-
-impl From<ServiceError> for MakeError {
-    fn from(error: ServiceError) -> Self {
-        if error.may_pass() {
-            Self::Later(error.failure.detail)
-        } else {
-            Self::Never(*error.failure)
-        }
+/// A file that cannot be read; one that is damaged will not be better.
+fn unread(error: BlobError) -> AttemptError {
+    match error.cause {
+        StoreFault::DamagedFile => damaged(),
+        _ => StoreError::from(error).into(),
     }
 }
 
-impl From<StoreError> for MakeError {
-    fn from(error: StoreError) -> Self {
-        match error.cause() {
-            StoreFault::DamagedFile => Self::Never(damaged()),
-            _ => Self::Later(error.to_string()),
-        }
-    }
-}
-
-impl From<BlobError> for MakeError {
-    fn from(error: BlobError) -> Self {
-        StoreError::from(error).into()
-    }
-}
-
-fn damaged() -> Failure {
-    Failure::new(
+fn damaged() -> AttemptError {
+    AttemptError::permanent(
         Fault::Service,
         "damaged-file",
         "A stored file of the series no longer holds what was received.",
+        "Erase the volume of the series, then send the series again.",
     )
-    .fix("Erase the volume of the series, then send the series again.")
 }
 
 /// Who sent the objects of a group. A title can be made up, an address hardly.
@@ -136,7 +110,7 @@ impl Turns {
 pub trait VolumeMaker: Send + Sync + 'static {
     /// Stores the volume of these files for the tenant of `group`. Returns its id. Done again, it gives
     /// the same id.
-    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError>;
+    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, AttemptError>;
 
     /// Files the job of `rule` on the volume of `group`. Returns its id; `None` if the job needs another volume, which
     /// has not come. Done again with the same `key`, it gives the same job.
@@ -146,7 +120,7 @@ pub trait VolumeMaker: Send + Sync + 'static {
         rule: &Rule,
         volume: &str,
         key: String,
-    ) -> Result<Option<String>, MakeError>;
+    ) -> Result<Option<String>, AttemptError>;
 }
 
 /// Settings for complete groups.
@@ -288,8 +262,8 @@ impl Gatherer {
         if group.state == GroupState::Gathering {
             match self.make(&group).await {
                 Ok(()) => self.observer.group(true),
-                Err(MakeError::Later(reason)) => return Err(reason),
-                Err(MakeError::Never(failure)) => {
+                Err(AttemptError::Retry { why, .. }) => return Err(why),
+                Err(AttemptError::Permanent(failure)) => {
                     tracing::warn!(
                         group = id,
                         code = failure.code,
@@ -312,7 +286,7 @@ impl Gatherer {
         Ok(())
     }
 
-    async fn make(&self, group: &IntakeGroup) -> Result<(), MakeError> {
+    async fn make(&self, group: &IntakeGroup) -> Result<(), AttemptError> {
         let files = self.local_files(group).await?;
         let volume = self.maker.make(group, &files).await?;
         let now = self.queue.now();
@@ -329,7 +303,7 @@ impl Gatherer {
     }
 
     /// The files of all objects of a group: those that wait, and those that are part of its volume.
-    async fn local_files(&self, group: &IntakeGroup) -> Result<Vec<LocalFile>, MakeError> {
+    async fn local_files(&self, group: &IntakeGroup) -> Result<Vec<LocalFile>, AttemptError> {
         let objects = self.store.objects(&group.id).await?;
         let volume = match &group.volume {
             Some(id) => {
@@ -341,17 +315,27 @@ impl Gatherer {
         let mut files = Vec::with_capacity(objects.len());
         for object in objects {
             let found = match (object.file, &volume) {
-                (Some(name), _) => self.files.received(&name, &object.file_sha256).await?,
+                (Some(name), _) => self
+                    .files
+                    .received(&name, &object.file_sha256)
+                    .await
+                    .map_err(unread)?,
                 (None, Some(volume)) => {
                     let mut stored = volume.files.iter();
                     match stored.find(|file| file.sha256 == object.file_sha256) {
-                        Some(file) => self.queue.items().blobs().local(&volume.id, file).await?,
+                        Some(file) => self
+                            .queue
+                            .items()
+                            .blobs()
+                            .local(&volume.id, file)
+                            .await
+                            .map_err(unread)?,
                         None => None,
                     }
                 }
                 (None, None) => None,
             };
-            files.push(found.ok_or_else(|| MakeError::Never(damaged()))?);
+            files.push(found.ok_or_else(damaged)?);
         }
         Ok(files)
     }
@@ -368,8 +352,8 @@ impl Gatherer {
                 let key = format!("{}-{volume}", group.id);
                 match self.maker.file(group, rule, volume, key).await {
                     Ok(job) => (job, None),
-                    Err(MakeError::Later(reason)) => return Err(reason),
-                    Err(MakeError::Never(failure)) => {
+                    Err(AttemptError::Retry { why, .. }) => return Err(why),
+                    Err(AttemptError::Permanent(failure)) => {
                         tracing::warn!(
                             group = group.id,
                             code = failure.code,

@@ -36,7 +36,6 @@
 
 mod association;
 mod command;
-mod desk;
 mod gather;
 mod listener;
 mod negotiate;
@@ -49,8 +48,7 @@ mod service;
 mod session;
 mod wire;
 
-pub use desk::Intake;
-pub use gather::{GatherSettings, Gatherer, MakeError, VolumeMaker};
+pub use gather::{GatherSettings, Gatherer, VolumeMaker};
 pub use listener::{Listener, TlsConfiguration};
 pub use observer::{AssociationEnd, IntakeObserver};
 pub use receive::{
@@ -65,3 +63,17 @@ pub use senders::{AeTitle, Sender, Senders};
 pub use service::ScpSettings;
 pub use session::{RecordedGroups, Session, Sessions, Waits};
 pub use wire::{WireError, decode};
+
+use std::sync::Arc;
+
+/// The reception of objects.
+pub struct Intake {
+    /// Takes objects.
+    pub(crate) receiver: Arc<Receiver>,
+    /// The groups that wait.
+    pub(crate) sessions: Arc<Sessions>,
+    /// The tables.
+    pub(crate) store: Arc<dyn IntakeStore>,
+    /// The files.
+    pub(crate) files: Arc<dyn ReceivedFiles>,
+}

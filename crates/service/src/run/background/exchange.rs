@@ -1,12 +1,12 @@
 //! The exchange with archives: series are fetched and stored as uploads are, objects of results are made and delivered.
 
-use crate::base::error::{Refusal, ServiceError};
+use crate::base::error::{AttemptError, Refusal, ServiceError};
 use crate::base::records::{Failure, Fault, Resource, StoreError, Tags, Tenant};
 use crate::callers::Agent;
 use crate::limits::quotas::Addition;
 use crate::network::archive::{
     ArchiveObject, Deliverer, Exchange, ExchangeHost, ExchangeSettings, Puller, SeriesParts,
-    StoredSeries, Trouble,
+    StoredSeries,
 };
 use crate::network::hooks::RetrySchedule;
 use crate::use_cases::service::Service;
@@ -56,9 +56,9 @@ pub async fn run(service: Arc<Service>, end: CancellationToken) {
 }
 
 /// A refused upload, as the trouble of a fetch. That the tenant's quota is full lasts until somebody erases something.
-fn trouble(error: ServiceError) -> Trouble {
+fn trouble(error: ServiceError) -> AttemptError {
     if error.refusal == Refusal::NoRoom && error.failure.code == "storage-quota" {
-        return Trouble::Final(*error.failure);
+        return AttemptError::Permanent(*error.failure);
     }
     error.into()
 }
@@ -69,7 +69,7 @@ impl ExchangeHost for Service {
         &self,
         tenant: &Tenant,
         mut parts: SeriesParts,
-    ) -> Result<StoredSeries, Trouble> {
+    ) -> Result<StoredSeries, AttemptError> {
         let blobs = self.items().blobs();
         blobs.require_room(0).map_err(StoreError::from)?;
         let addition = Addition::bytes(0);
@@ -104,7 +104,11 @@ impl ExchangeHost for Service {
         })
     }
 
-    async fn held(&self, tenant: &Tenant, volume: &str) -> Result<Option<StoredSeries>, Trouble> {
+    async fn held(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+    ) -> Result<Option<StoredSeries>, AttemptError> {
         let pin = self.items().pin(volume).await?;
         let intact = self.items().intact_volume(volume).await?.is_some();
         let held = intact
@@ -126,9 +130,9 @@ impl ExchangeHost for Service {
         tenant: &Tenant,
         result: &str,
         name: &str,
-    ) -> Result<ArchiveObject, Trouble> {
+    ) -> Result<ArchiveObject, AttemptError> {
         let gone = |what: &str| {
-            Trouble::lasting(
+            AttemptError::permanent(
                 Fault::Content,
                 "erased",
                 what,
@@ -151,10 +155,10 @@ impl ExchangeHost for Service {
         let made = self
             .decoding
             .run_on(bytes, dicom::object_memory(shape), make);
-        let made = made.await?.map_err(Trouble::Final)?;
+        let made = made.await?.map_err(AttemptError::Permanent)?;
         let made = made.ok_or_else(|| gone("The result has no such object."))?;
         ArchiveObject::from_bytes(made.bytes).ok_or_else(|| {
-            Trouble::lasting(
+            AttemptError::permanent(
                 Fault::Service,
                 "internal",
                 "The object lacks an identifier.",

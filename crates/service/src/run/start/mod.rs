@@ -1,23 +1,27 @@
 //! Starting a service on its stores, and ending it.
 //!
-//! 1. [`open`] makes the [`Service`] from settings, engine, stores and the factory of HTTP clients, returns the jobs of
+//! 1. [`check_role`] and [`DicomListener::bind`] refuse settings that cannot be served, before a store is opened.
+//! 2. [`open`] makes the [`Service`] from settings, engine, stores and the factory of HTTP clients, returns the jobs of
 //!    a process that died to the queue, and checks the rules of the settings. Nothing runs yet.
-//! 2. [`RunningService::start`] starts workers and background tasks.
-//! 3. [`RunningService::stop`] ends them in order; unfinished jobs go back to the queue.
+//! 3. [`Service::entrance`] says who is admitted at the address.
+//! 4. [`RunningService::start`] starts workers and background tasks.
+//! 5. [`RunningService::stop`] ends them in order; unfinished jobs go back to the queue.
 
-mod intake;
+mod dicom;
+mod gate;
 
-pub use intake::scp_settings;
+pub use dicom::DicomListener;
+pub use gate::Entrance;
 
 use crate::base::http_client::ClientFactory;
 use crate::base::memory::MemoryBudget;
 use crate::base::records::{Clock, DeathLimit, Failure, Fault, ServiceClock, StoreError};
-use crate::callers::{Quota, Recorder};
-use crate::config::Settings;
+use crate::callers::{IssuerError, Quota, Recorder};
 use crate::config::stores::Stores;
+use crate::config::{Role, Settings};
 use crate::items::{Items, RetentionAges};
 use crate::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
-use crate::limits::decoding::Decoding;
+use crate::limits::decoding::{Decoding, DecodingLimits};
 use crate::limits::quotas::Quotas;
 use crate::network::archive::ArchiveDesk;
 use crate::network::hooks::{Dispatcher, HookSettings, Hooks, RetrySchedule, UrlGuard};
@@ -28,15 +32,45 @@ use crate::use_cases::service::Service;
 use crate::work::Engine;
 use futures::future::BoxFuture;
 use std::io;
+use std::net::SocketAddr;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use tokio::sync::Notify;
 use tokio::task::{JoinError, JoinHandle};
 use tokio_util::sync::CancellationToken;
 
-/// Why a service could not be opened.
+/// Why a service was not started.
 #[derive(Debug, thiserror::Error)]
-pub enum OpenError {
+pub enum StartError {
+    /// The role needs other processes, which could not reach what this one stores.
+    #[error("role = {role} is for several processes on one store, but {lacking}")]
+    Role {
+        /// The role.
+        role: Role,
+        /// The part that only this process can reach.
+        lacking: &'static str,
+    },
+    /// Callers without credentials would be served on an address that others can reach.
+    #[error(
+        "{0} can be reached from other machines, but there is no API key and no OpenID Connect issuer"
+    )]
+    OpenHttp(SocketAddr),
+    /// Everybody who can reach the address could send objects by DICOM.
+    #[error(
+        "{0} can be reached from other machines, but no system is listed that may send images there"
+    )]
+    OpenDicom(SocketAddr),
+    /// The address for DICOM cannot be used.
+    #[error("cannot listen on {address} for DICOM: {reason}")]
+    DicomAddress {
+        /// The address.
+        address: SocketAddr,
+        /// The system's message.
+        reason: io::Error,
+    },
+    /// The settings of the OpenID Connect issuer cannot be used.
+    #[error("the OpenID Connect issuer: {0}")]
+    Issuer(#[from] IssuerError),
     /// The database cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -56,6 +90,24 @@ pub struct OpenedService {
     close_stores: CloseStores,
 }
 
+/// Refuses a role that needs other processes, if these cannot share what this one stores.
+///
+/// # Errors
+/// [`StartError::Role`].
+pub fn check_role(settings: &Settings) -> Result<(), StartError> {
+    let role = settings.role;
+    let lacking = if role == Role::All {
+        return Ok(());
+    } else if settings.postgres().is_none() {
+        "the database is a file in the data folder, which one process uses"
+    } else if settings.blobs.bucket().is_none() {
+        "the files are in the data folder, which one process uses"
+    } else {
+        return Ok(());
+    };
+    Err(StartError::Role { role, lacking })
+}
+
 type CloseStores = Box<dyn FnOnce() -> BoxFuture<'static, ()> + Send + Sync>;
 
 /// Makes a service on its stores. To be called in the runtime in which it will run.
@@ -67,7 +119,7 @@ pub async fn open(
     engine: Engine,
     stores: Stores,
     http_clients: Arc<dyn ClientFactory>,
-) -> Result<OpenedService, OpenError> {
+) -> Result<OpenedService, StartError> {
     let time = Arc::new(TimeOfDay {
         clock: Arc::new(ServiceClock::default()),
         store: stores.time.clone(),
@@ -81,10 +133,14 @@ pub async fn open(
     let metrics = Metrics::new();
     let spans = Spans::new(settings.otlp_endpoint.0.as_deref(), &*http_clients)?;
     queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
-    let decoding = Arc::new(Decoding::new(
-        &settings,
-        metrics.requests.decoding_waits.clone(),
-    ));
+    let limits = DecodingLimits {
+        memory: settings.decoding_memory.0,
+        queue: settings.decoding_queue,
+        time: settings.decoding_time.0,
+        rate: settings.decoding_rate.0,
+    };
+    let waits = metrics.requests.decoding_waits.clone();
+    let decoding = Arc::new(Decoding::new(limits, waits));
     let service = Service {
         engine,
         access: stores.access.clone(),
@@ -112,7 +168,7 @@ pub async fn open(
         settings,
         queue,
     };
-    service.check_rules().map_err(OpenError::Rules)?;
+    service.check_rules().map_err(StartError::Rules)?;
     Ok(OpenedService {
         service: Arc::new(service),
         time,
@@ -237,11 +293,11 @@ fn receiving(
         queue.clock().clone(),
         Arc::new(metrics.intake.clone()),
         decoding,
-        intake::receiver_settings(settings),
+        dicom::receiver_settings(settings),
     );
     Intake {
         receiver: Arc::new(receiver),
-        sessions: Sessions::new(intake::waits(settings)),
+        sessions: Sessions::new(dicom::waits(settings)),
         store: stores.intake.clone(),
         files: stores.received.clone(),
     }

@@ -1,12 +1,18 @@
-//! The settings of the intake.
+//! The reception of objects by DICOM: its settings, and the listener beside the HTTP interface.
 
 use crate::config::Settings;
 use crate::limits::decoding::Decoding;
 use crate::network::intake::{
-    HeaderTurns, HeaderWork, IntakeRoom, ReceiveError, ReceiverSettings, ScpSettings, Senders,
-    Waits,
+    HeaderTurns, HeaderWork, IntakeRoom, Listener, ReceiveError, ReceiverSettings, ScpSettings,
+    Senders, TlsConfiguration, Waits,
 };
+use crate::run::start::StartError;
+use crate::use_cases::service::Service;
 use async_trait::async_trait;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use tokio::task::JoinHandle;
 use ventriform::image::volume::ReadLimits;
 
 #[async_trait]
@@ -20,7 +26,7 @@ impl HeaderTurns for Decoding {
 const PDU_BYTES: (u64, u64) = (4 << 10, 16 << 20);
 
 /// The waiting times of groups.
-pub fn waits(settings: &Settings) -> Waits {
+pub(super) fn waits(settings: &Settings) -> Waits {
     Waits {
         quiet: settings.series_quiet.0,
         patience: settings.series_patience.0,
@@ -28,7 +34,7 @@ pub fn waits(settings: &Settings) -> Waits {
 }
 
 /// Limits on what is received.
-pub fn receiver_settings(settings: &Settings) -> ReceiverSettings {
+pub(super) fn receiver_settings(settings: &Settings) -> ReceiverSettings {
     ReceiverSettings {
         room: IntakeRoom {
             objects: settings.intake_objects,
@@ -46,9 +52,72 @@ pub fn receiver_settings(settings: &Settings) -> ReceiverSettings {
     }
 }
 
+/// The address on which objects are received by DICOM, and from whom.
+pub struct DicomListener {
+    listener: TcpListener,
+    address: SocketAddr,
+    settings: ScpSettings,
+}
+
+impl DicomListener {
+    /// Listens for DICOM if the settings ask for it.
+    ///
+    /// # Errors
+    /// If the address cannot be used, or strangers could send and the settings do not say that they may.
+    pub fn bind(settings: &Settings) -> Result<Option<Self>, StartError> {
+        let address = settings.dicom_listen.0;
+        let Some(address) = address.filter(|_| settings.role.serves()) else {
+            return Ok(None);
+        };
+        let unusable = |reason| StartError::DicomAddress { address, reason };
+        let loopback = address.ip().to_canonical().is_loopback();
+        let scp = scp_settings(settings, loopback).ok_or(StartError::OpenDicom(address))?;
+        if scp.senders.others && !loopback {
+            tracing::warn!(%address, "every system may send images by DICOM (allow_anonymous)");
+        }
+        let listener = TcpListener::bind(address).map_err(unusable)?;
+        listener.set_nonblocking(true).map_err(unusable)?;
+        Ok(Some(Self {
+            address: listener.local_addr().map_err(unusable)?,
+            listener,
+            settings: scp,
+        }))
+    }
+
+    /// The address on which it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Receives objects until the service shuts down; over TLS, if `tls` says how.
+    ///
+    /// # Errors
+    /// If the system refuses the socket.
+    pub fn serve(
+        self,
+        service: &Service,
+        tls: Option<TlsConfiguration>,
+    ) -> io::Result<JoinHandle<()>> {
+        let scp = Listener::new(
+            self.settings,
+            service.intake.receiver.clone(),
+            service.intake.sessions.clone(),
+            service.recorder.clone(),
+            (
+                service.clock().clone(),
+                Arc::new(service.metrics.intake.clone()),
+            ),
+            service.closing.clone(),
+        );
+        let listener = tokio::net::TcpListener::from_std(self.listener)?;
+        tracing::info!(address = %self.address, "listening for DICOM");
+        Ok(tokio::spawn(scp.run(listener, tls)))
+    }
+}
+
 /// The settings of the SCP. `loopback` if only this machine can reach it. `None` if everybody could send
 /// and the operator has not said that everybody may.
-pub fn scp_settings(settings: &Settings, loopback: bool) -> Option<ScpSettings> {
+fn scp_settings(settings: &Settings, loopback: bool) -> Option<ScpSettings> {
     let listed = settings.senders.0.clone();
     let others = settings.allow_anonymous || (loopback && listed.is_empty());
     if listed.is_empty() && !others {
