@@ -16,6 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use ventriform_program::cli::advice::advised;
 use ventriform_program::server::{ServeError, start};
 use ventriform_service::base::records::{Clock, StoreError, SystemClock, Tenant, rfc3339};
 use ventriform_service::callers::{
@@ -256,9 +257,10 @@ async fn beyond_loopback_nobody_is_served_without_credentials() {
     };
     let everywhere = || TcpListener::bind("0.0.0.0:0").unwrap();
     let refused = start(settings(false), fake_engine(), everywhere()).await;
-    let Err(ServeError::Start(StartError::OpenHttp(_))) = refused.map(|_| ()) else {
+    let Err(refused @ ServeError::Start(StartError::OpenHttp(_))) = refused.map(|_| ()) else {
         panic!("it must not start");
     };
+    assert!(advised(&refused.into()).contains("--allow-anonymous"));
     let open = start(settings(true), fake_engine(), everywhere())
         .await
         .unwrap();
