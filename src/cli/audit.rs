@@ -32,8 +32,8 @@ pub struct AuditArgs {
 enum AuditCommand {
     /// Walk the chain of hashes and name the first break; fails if there is one
     Verify(DataArgs),
-    /// Say what a newer trail has and this one lacks: keys revoked, items erased and legal holds set after the backup that
-    /// was restored here; with --apply, do the same here (stop the service first)
+    /// List acts of a newer trail that are missing in this restored store: keys revoked, items erased and legal holds set
+    /// after the backup; with --apply, repeat them here (stop the service first)
     Missed(MissedArgs),
     /// Print all events, newest first, one FHIR AuditEvent per line
     Print(DataArgs),
@@ -45,7 +45,7 @@ struct MissedArgs {
     /// the URL of a PostgreSQL database. Nothing is written there
     #[arg(long, value_name = "DIR|URL")]
     from: String,
-    /// Do here what was missed
+    /// Repeat the missing acts here
     #[arg(long)]
     apply: bool,
     #[command(flatten)]

@@ -35,8 +35,8 @@ labels_gate01.nii.gz, ...
 (wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {
-    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in the order that DICOM headers state,
-    /// or else of the numbers in their names (gate2 before gate10), or as given
+    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, ordered by DICOM headers, else by the
+    /// numbers in their names (gate2 before gate10), else as given
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// Folder to write to (created if missing)

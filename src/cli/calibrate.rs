@@ -151,7 +151,7 @@ fn choice(made: &Calibration) -> String {
     let learnt_on = if made.rows.len() > 1 {
         "learnt on the other masks"
     } else {
-        "with one mask learnt on none: no distances, the usual level"
+        "with one mask: no mask left to learn from, so no distances and the usual level"
     };
     format!(
         "  mean E_J, {learnt_on}: by distances {edge:.3}, by a level {level:.3}; without a profile {without:.3}. A \
@@ -166,7 +166,7 @@ pub(super) fn gain(made: &Calibration, sample: Sample) -> String {
     };
     let [low, high] = gain.interval;
     let verdict = if gain.may_be_none() {
-        ": cannot be told from none"
+        ": not distinguishable from zero"
     } else {
         ""
     };

@@ -19,7 +19,7 @@ use ventriform::results::figures;
 use ventriform::runs::advice::Explain;
 use ventriform::runs::rest_stress::{ComparisonOrder, from_files};
 
-/// Compare rest and stress of one patient: where the wall lacks blood only under stress
+/// Compare rest and stress of one patient: reversible and fixed defects
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform compare --stress stress.dcm --rest rest.dcm -o out

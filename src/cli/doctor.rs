@@ -21,16 +21,15 @@ use ventriform_store::{Examination, Repair, examine, examine_on_server};
   ventriform doctor --data-dir data --blobs s3://hearts/prod
 
 The status is 0 if nothing is wrong or everything was repaired, else 1; also 1 if a repair found that rows are
-lost. A repair deletes no content: what is broken or has no record is moved into the folder `quarantine`. What it
-lost, gave to somebody or closed is named here and written into the audit trail.")]
+lost. A repair deletes no content: what is broken or has no record is moved into the folder `quarantine`. \
+What was lost, given to another tenant or closed is listed here and in the audit trail.")]
 pub struct DoctorArgs {
     #[command(flatten)]
     store: StoreArgs,
     /// Repair what can be repaired
     #[arg(long)]
     repair: bool,
-    /// Tenant that gets the items whose holder is unknown, with a legal hold on volumes; unless given, they go to the
-    /// quarantine, where they stay
+    /// Tenant for items without an owner (volumes get a legal hold) [default: they stay in the quarantine]
     #[arg(long, value_name = "NAME", requires = "repair")]
     tenant: Option<Tenant>,
     /// Print the findings as JSON

@@ -54,7 +54,7 @@ struct CreateArgs {
     /// What it allows: read, submit (also upload, file jobs, erase) or admin (also keys and audit)
     #[arg(long, value_name = "SCOPE")]
     scope: Scope,
-    /// Whose things it opens: what other tenants store does not exist for it
+    /// Tenant of the key. Items of other tenants are not found with it
     #[arg(long, value_name = "TENANT", default_value = "default")]
     tenant: Tenant,
     /// How long it is valid, such as 90d; for ever unless given
@@ -63,7 +63,7 @@ struct CreateArgs {
     /// Requests per minute, instead of the setting quota_requests
     #[arg(long, value_name = "NUMBER")]
     requests_per_minute: Option<u64>,
-    /// Size of all that the tenant stores, such as 10GiB, instead of the setting quota_bytes
+    /// Storage limit of the tenant, such as 10GiB, in place of quota_bytes
     #[arg(long, value_name = "SIZE")]
     stored_bytes: Option<Size>,
     /// Waiting jobs of the tenant, instead of the setting quota_jobs

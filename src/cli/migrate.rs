@@ -105,7 +105,7 @@ fn note_moved(place: &str, records: &DataArgs) -> Result<()> {
         }
         Some((scheme, _)) => {
             bail!(
-                "--moved-files: {scheme}:// is no place of files: give s3://BUCKET/PREFIX or a folder"
+                "--moved-files: {scheme}:// cannot hold files: give s3://BUCKET/PREFIX or a folder"
             )
         }
         None => MovedFiles::Folder(PathBuf::from(place)),
@@ -142,7 +142,7 @@ impl MigrateArgs {
                     let place: BlobPlace = part.parse().map_err(anyhow::Error::msg)?;
                     flags.blobs.replace(place).is_some()
                 }
-                Some((scheme, _)) => bail!("--to: {scheme}:// is none of postgres:// and s3://"),
+                Some((scheme, _)) => bail!("--to: {scheme}:// is neither postgres:// nor s3://"),
                 None => folder.replace(PathBuf::from(part)).is_some(),
             };
             if twice {

@@ -84,7 +84,7 @@ export function LimitsView() {
       {isLoaded && all.length === 0 && (
         <p class="quiet">
           None is stored. Without limits, uptake is shown in per cent of each scan’s own brightest wall, and there are
-          no scores. None comes with the program: limits belong to a camera, a protocol and a tracer.
+          no scores. The program has none: limits hold for one camera, protocol and tracer.
         </p>
       )}
       <ul class="limits-list">
@@ -102,7 +102,7 @@ async function textOf(file: File): Promise<string> {
   try {
     JSON.parse(text);
   } catch {
-    throw new Error("This is no JSON file. Choose the file that normals build has written.");
+    throw new Error("This is not a JSON file. Choose the file that normals build has written.");
   }
   return text;
 }

@@ -11,8 +11,8 @@ import { fileComparison } from "./work";
 import { volumes } from "./library";
 
 const TOLD = {
-  headers: "The headers say which is which.",
-  names: "Guessed from the names: make sure that it is right.",
+  headers: "Filled in from the headers.",
+  names: "Guessed from the file names: please check.",
 };
 
 interface Props {
@@ -92,7 +92,7 @@ export function PairForm({
           </label>
         ))}
       </fieldset>
-      <p class="quiet">{guess.told ? TOLD[guess.told] : "Neither header nor name tells it: choose."}</p>
+      <p class="quiet">{guess.told ? TOLD[guess.told] : "Not stated in headers or names: please choose."}</p>
       {alike && <p class="warning">Both headers say {statedRole(a)}.</p>}
       {twoPatients && !asOnePatient && (
         <p class="warning">

@@ -495,7 +495,7 @@ export function ReaderChoice({ common, text, onText }: Omit<ChoiceProps, "volume
   }, []);
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
-      <option value="">nobody: the wall as fitted</option>
+      <option value="">none: the wall as fitted</option>
       {readers.map(reader => (
         <option key={reader.id} value={reader.id}>
           {reader.name}

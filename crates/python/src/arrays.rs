@@ -51,7 +51,7 @@ pub fn to_mesh(py: Python<'_>, vertices: &[[f64; 3]], triangles: &[[u32; 3]]) ->
     let finite = vertices.iter().flatten().all(|x| x.is_finite());
     let known = |corner: &u32| (*corner as usize) < vertices.len();
     if !finite || !triangles.iter().flatten().all(known) {
-        let reason = "a vertex is not finite, or a triangle has a corner that is no vertex";
+        let reason = "a vertex is not finite, or a triangle refers to a vertex that does not exist";
         return Err(exception(
             py,
             &refused("mesh", reason, "Give a closed surface."),

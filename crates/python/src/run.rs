@@ -157,7 +157,10 @@ fn raise<T>(py: Python<'_>, outcome: Outcome<T>) -> PyResult<T> {
     match outcome {
         Ok(Ok(made)) => Ok(made),
         Ok(Err(Stopped::Failed(failure))) => Err(exception(py, &failure)),
-        Ok(Err(Stopped::Cancelled)) => Err(internal(py, "the work was cancelled by nobody")),
+        Ok(Err(Stopped::Cancelled)) => Err(internal(
+            py,
+            "the work ended as cancelled without a request",
+        )),
         Err(panic) => {
             let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
             let text = text.or_else(|| panic.downcast_ref::<String>().cloned());

@@ -503,7 +503,7 @@ impl<'a> Doctor<'a> {
             self.without_item(rows).await?;
             if self.repair.is_some() && !rows.on_server() {
                 for (table, dropped) in rows.drop_orphans(SystemClock.now()).await? {
-                    let detail = format!("{dropped} rows name what nobody has any more.");
+                    let detail = format!("{dropped} rows refer to items that no longer exist.");
                     let repair = Some("they were removed");
                     self.found.note("orphaned-rows", table, detail, repair);
                 }
@@ -526,7 +526,7 @@ impl<'a> Doctor<'a> {
                 rows.forget(&holder.id, Some(SystemClock.now())).await?;
             }
             let detail = format!(
-                "Tenant {} has it, and it has neither row nor files.",
+                "Tenant {} owns it, but its row and files are missing.",
                 holder.tenant
             );
             let repair = self.if_repairing("the record that the tenant has it was removed");
@@ -544,7 +544,7 @@ impl<'a> Doctor<'a> {
         let keys = rows.keys(None, page).await?;
         if keys.items.is_empty() && rows.is_closed().await? {
             let detail = format!(
-                "The service asks for credentials, and there is no key. Unless it has an issuer of tokens, \
+                "The service needs credentials, and no key exists. Unless it has an issuer of tokens, \
                  {HOW_TO_OPEN}."
             );
             self.found.remark("keys-missing", "api_keys", detail, None);

@@ -191,7 +191,7 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <Particulars compared={compared} />
         <Downloads result={compared.result} volume={scans.stress} />
         <Others compared={compared} />
-        <p class="research foot">Research software, not a medical device. Measurements are no diagnosis.</p>
+        <p class="research foot">Research software, not a medical device. Measurements are not a diagnosis.</p>
       </aside>
       <Stage compared={compared} scene={scene} name={nameOf(scans.stress)} />
       <div class="pictures maps-side">

@@ -83,7 +83,7 @@ export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean
           ))}
         </ul>
       ) : (
-        <p class="quiet">No reason to doubt it was found.</p>
+        <p class="quiet">No flags.</p>
       )}
       {known && (
         <details open={open}>

@@ -134,7 +134,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
           </p>
         )}
         {map.orientation === "unknown" && (
-          <p class="warning">Nothing tells which side is anterior: segments have no names.</p>
+          <p class="warning">The anterior side is unknown: segments have no names.</p>
         )}
       </figcaption>
     </figure>

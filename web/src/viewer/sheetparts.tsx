@@ -126,7 +126,7 @@ export function Head({ volume, title, children }: { volume: Volume; title: strin
 export function Foot({ page, of = 2 }: { page: number; of?: number }) {
   return (
     <footer>
-      ventriform: research software, not a medical device. Measurements are no diagnosis. Printed{" "}
+      ventriform: research software, not a medical device. Measurements are not a diagnosis. Printed{" "}
       {moment(new Date().toISOString())}. Page {page} of {of}
     </footer>
   );

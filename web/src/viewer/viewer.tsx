@@ -412,7 +412,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
         </form>
       )}
       {tab === "correct" && scene && <Correction scene={scene} volume={volume} shown={shown} />}
-      <p class="research foot">Research software, not a medical device. Measurements are no diagnosis.</p>
+      <p class="research foot">Research software, not a medical device. Measurements are not a diagnosis.</p>
     </aside>
   );
 }

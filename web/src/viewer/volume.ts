@@ -180,7 +180,7 @@ function placeOf(view: DataView, shape: [number, number, number]): [Row, Row, Ro
 /** Reads a NIfTI-1 file of one frame in little-endian order. */
 function parseNifti(bytes: ArrayBuffer): Voxels {
   const view = new DataView(bytes);
-  if (view.byteLength < 352 || view.getInt32(0, true) !== 348) throw new Error("The voxels are no NIfTI-1 file.");
+  if (view.byteLength < 352 || view.getInt32(0, true) !== 348) throw new Error("The voxels are not a NIfTI-1 file.");
   const shape = [1, 2, 3].map(axis => view.getInt16(40 + 2 * axis, true)) as [number, number, number];
   const type = TYPES[view.getInt16(70, true)];
   if (!type) throw new Error("The voxels are of an unknown type.");

@@ -269,7 +269,7 @@ export function Wall(props: Props) {
       {title && <p class="tag">{title}</p>}
       {plain && (
         <p class="off">
-          This browser offers no WebGL: the wall is drawn plainly and turns more slowly. All else works.
+          This browser has no WebGL: the wall is drawn in a simple way and turns more slowly.
         </p>
       )}
       <figcaption>

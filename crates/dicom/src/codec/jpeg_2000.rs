@@ -93,7 +93,9 @@ fn code_stream(bytes: &[u8]) -> Result<&[u8], String> {
         return Ok(bytes);
     }
     if !bytes.starts_with(&JP2_SIGNATURE) {
-        return Err("the frame is no JPEG 2000 stream: it does not begin with FF 4F FF 51".into());
+        return Err(
+            "the frame is not a JPEG 2000 stream: it does not begin with FF 4F FF 51".into(),
+        );
     }
     let start = bytes.windows(4).position(|four| four == CODESTREAM_START);
     let (boxes, stream) = bytes.split_at(start.unwrap_or(bytes.len()));

@@ -59,7 +59,7 @@ impl Header {
     fn read(bytes: &[u8]) -> Result<Self, String> {
         let cut = || "the JPEG-LS header is cut off".to_owned();
         if !bytes.starts_with(&[0xff, 0xd8]) {
-            return Err("the frame is no JPEG-LS stream".into());
+            return Err("the frame is not a JPEG-LS stream".into());
         }
         let mut header = Self::default();
         let mut at = 2;

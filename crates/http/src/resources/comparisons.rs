@@ -241,7 +241,7 @@ async fn scan_of(
             corrections: Map::new(),
         }),
         _ => {
-            let other = format!("`{field}` is no id of a volume, a segmentation or a beat.");
+            let other = format!("`{field}` is not the id of a volume, a segmentation or a beat.");
             Err(Problem::invalid_field(field, other)
                 .fix("Give the id of a stored volume, segmentation or beat."))
         }

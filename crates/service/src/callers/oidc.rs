@@ -130,7 +130,8 @@ impl Issuer {
     /// # Errors
     /// If it is not valid, or cannot be checked.
     pub async fn subject(&self, token: &str, clock: &dyn Clock) -> Result<Identity, IssuerError> {
-        let header = decode_header(token).map_err(|_| refused("it is no JWT of a known kind"))?;
+        let header =
+            decode_header(token).map_err(|_| refused("it is not a JWT of a supported kind"))?;
         if matches!(
             header.alg,
             Algorithm::HS256 | Algorithm::HS384 | Algorithm::HS512

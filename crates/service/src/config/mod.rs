@@ -261,7 +261,7 @@ settings! {
     /// Address and port to listen on; port 0 takes any free one
     listen: SocketAddr = "127.0.0.1:8080";
     /// What this process does: `all`; or, of several on one PostgreSQL database and one S3 store, `api`
-    /// answers requests and receives images, `worker` computes jobs and does what is done in the background
+    /// answers requests and receives images, `worker` computes jobs and does the background work
     role: Role = "all";
     /// Folder for the database and the files; created if missing, used by one process at a time
     data_dir: PathBuf = "ventriform-data";
@@ -298,7 +298,7 @@ settings! {
     /// Largest number of waiting jobs; more are rejected with status 429, unless their tenant has less than
     /// its equal share of them
     queue_limit: usize = "1000";
-    /// Number of times a job may end its own process before it is failed. A job that was running
+    /// Crashes of its own process after which a job fails. A job that was running
     /// when the service died is computed in a process of its own, so power cuts do not count
     attempt_limit: u32 = "3";
     /// Longest computation of one job
@@ -335,8 +335,8 @@ settings! {
     /// Memory for answers about volumes, models, segmentations, beats, comparisons, templates and ended jobs, which are
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
-    /// Memory that bodies of requests and answers take together, shared out between tenants and between the
-    /// clients of each: one client alone has at most a third of it, an anonymous one half. Requests beyond
+    /// Memory that bodies of requests and answers take together, shared between tenants, and between the
+    /// clients of each: at most a third for one client, half for an anonymous one. Requests beyond
     /// that wait for two seconds, then they are answered with status 503
     request_memory: Size = "128MiB";
     /// Threads for work that blocks (files, decoding); more of it waits for one. `auto` is 64. Each takes up to
@@ -426,22 +426,22 @@ settings! {
     connection_limit: usize = "4096";
     /// Largest number of open connections of one client address, counted as for connection_limit
     client_connection_limit: usize = "3072";
-    /// Proxies whose word is taken: addresses and networks, separated by commas. X-Forwarded-For or
+    /// Trusted proxies: addresses and networks, separated by commas. X-Forwarded-For or
     /// Forwarded names the client; X-Forwarded-Proto, -Host, -Port and -Prefix or Forwarded the address
     /// that it used, for links and the page. The limit on one client's connections does not apply to them
     trusted_proxies: Networks = "";
-    /// Path under which a proxy shows the service, such as `/heart`; with or without it, requests are
-    /// answered, and links begin with it. X-Forwarded-Prefix of a trusted proxy goes before it
+    /// Path of the service behind a proxy, such as `/heart`. Requests may have it or not; links begin
+    /// with it. X-Forwarded-Prefix of a trusted proxy has priority
     base_path: BasePath = "";
     /// Time limit for the headers of a request, and for the TLS handshake
     header_timeout: Span = "10s";
     /// How long a connection may be idle between two requests. It is longer than usual proxies keep
-    /// theirs (nginx 60s, Traefik 90s, Google Cloud 600s), or they would send requests into closing ones
+    /// theirs (nginx 60s, Traefik 90s, Google Cloud 600s), so that they do not use a connection that is closing
     keep_alive_timeout: Span = "620s";
     /// Longest pause of a client in reading an answer; it must also read 1 KiB per second on average
     write_timeout: Span = "30s";
-    /// Where a request was refused before its body had come: longest time for its client to go on sending,
-    /// to read the answer and to close. A proxy that cannot send on may answer with 502 instead
+    /// After an early refusal: longest time for the client to send the rest, read the answer and close.
+    /// A proxy that cannot send on may answer with 502 instead
     linger_time: Span = "10s";
     /// Longest pause of such a client in sending
     linger_pause: Span = "2s";

@@ -172,10 +172,10 @@ async fn limited<T>(
     }
 }
 
-const CLOCK_IN_DOUBT: &str = "The time of day is in doubt: nothing is erased or given up by age until the clock has \
-     gone on for an hour, or is where it was expected.";
+const CLOCK_IN_DOUBT: &str = "The time of day is in doubt: no ages count until the clock has run for an hour \
+    without a step, or is back at the expected time.";
 
-const UNKNOWN_FAULT: &str = "The database does not do what it is told.";
+const UNKNOWN_FAULT: &str = "The database reports an unexpected error; see the log.";
 
 const DISK_FULL: &str = "The disk is full, or nearly so.";
 

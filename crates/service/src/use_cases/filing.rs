@@ -321,7 +321,7 @@ impl Service {
 }
 
 fn key_reused() -> ServiceError {
-    let detail = "This key was already used for another request.";
+    let detail = "This idempotency key was already used for another request.";
     Failure::new(Fault::Request, "idempotency-key-reused", detail)
         .at("Idempotency-Key")
         .fix("Use a new key for each new request.")

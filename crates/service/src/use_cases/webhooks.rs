@@ -210,7 +210,11 @@ fn events_of(names: &[String]) -> Result<Vec<HookEvent>, Failure> {
         }
     }
     if events.is_empty() {
-        return Err(invalid("events", "The webhook would be told nothing.").fix(events_fix()));
+        return Err(invalid(
+            "events",
+            "`events` is empty: the webhook would get no request.",
+        )
+        .fix(events_fix()));
     }
     Ok(events)
 }

@@ -100,7 +100,7 @@ fn table(rows: Vec<Value>) -> Result<Vec<CohortCase>, Failure> {
             }
         }
         if Resource::from_id(&case.volume) != Some(Resource::Volume) {
-            return Err(wrong(&place(".volume"), "It is no id of a volume."));
+            return Err(wrong(&place(".volume"), "It is not the id of a volume."));
         }
         if !names.insert(case.case.clone()) {
             return Err(wrong(&place(".case"), "Another row has the same name."));

@@ -82,7 +82,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             example: "built-in usual",
         },
         default: "",
-        summary: "Name of the model whose fit is kept, of those that are fitted, as a report names its template: a \
+        summary: "Name (as in a report) of the fitted model to keep: a \
                   correction by the position, the axis or the base then keeps its heart. Default: the one with the \
                   greatest confidence",
         read: |d, v| {
@@ -125,7 +125,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             example: "2, or the name of a DICOM segment",
         },
         default: "",
-        summary: "Which structure of the expert's mask is meant, if the file holds several: the number of \
+        summary: "Structure of the expert's mask, if the file has several: the number of \
                   a label or segment, or the name or code of a segment. Default: the only one; of \
                   segments, the one coded as myocardium",
         read: |d, v| {
@@ -510,8 +510,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             deform.edge,
             "apparent",
             groups::MAIN,
-            "Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred \
-             image) or anatomical (the wall itself, without the thickness that blur adds). The report \
+            "Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) \
+             or anatomical (the wall itself, without the thickness that blur adds). The report \
              has the volumes of both",
             "apparent" => WallEdge::Apparent,
             "anatomical" => WallEdge::Anatomical,
@@ -547,8 +547,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.orbit,
         "auto",
         groups::IMAGE,
-        "How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that \
-         motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan \
+        "Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not \
+         show in the image and is not flagged). auto: as a DICOM header says (Scan \
          Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on",
         "auto" => Orbit::Auto,
         "none" => Orbit::None,

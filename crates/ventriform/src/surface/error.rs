@@ -62,7 +62,7 @@ pub enum SurfaceError {
     /// A label map of so many labels that none can be guessed, or of labels that 32-bit floats do not
     /// tell apart.
     #[error(
-        "the volume is a label map with {}: which is the object cannot be told",
+        "the volume is a label map with {}: it is not known which one is the object",
         describe_labels(present)
     )]
     LabelNeeded {

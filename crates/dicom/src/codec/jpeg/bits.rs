@@ -113,7 +113,7 @@ impl<'a> Bits<'a> {
         Err(if self.count < 16 {
             "the JPEG data are cut off".into()
         } else {
-            "the JPEG data hold bits that are no code".into()
+            "the JPEG data hold bits that are not a code".into()
         })
     }
 

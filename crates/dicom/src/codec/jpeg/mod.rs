@@ -116,7 +116,7 @@ pub(super) fn decode(
 impl<'a> Header<'a> {
     fn read(process: Process, bytes: &'a [u8], layout: FrameLayout) -> Result<Self, String> {
         if !bytes.starts_with(&[0xff, 0xd8]) {
-            return Err("the frame is no JPEG stream: it does not begin with FF D8".into());
+            return Err("the frame is not a JPEG stream: it does not begin with FF D8".into());
         }
         let mut header = Self {
             bits: 0,

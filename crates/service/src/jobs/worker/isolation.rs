@@ -299,7 +299,7 @@ pub fn serve_isolated(works: &Works) -> std::io::Result<()> {
             Ok(Err(WorkError::Cancelled)) => Message::Failed(Failure::new(
                 Fault::Service,
                 "internal",
-                "The computation stopped although nobody asked it to.",
+                "The computation stopped without a request.",
             )),
             Err(_) => Message::Failed(super::run::panicked()),
         }

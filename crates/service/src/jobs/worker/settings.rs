@@ -11,7 +11,7 @@ pub struct WorkerSettings {
     pub threads: usize,
     /// Time for which other runs of the service respect a claim that is not renewed.
     pub lease: Duration,
-    /// Number of times a job may end its own process before it is failed.
+    /// Crashes of its own process after which a job fails.
     pub attempt_limit: u32,
     /// Longest computation of one job.
     pub time_limit: Duration,

@@ -244,7 +244,7 @@ impl Archive {
 fn base_url(text: &str) -> Result<String, ArchiveFault> {
     let wrong = |reason: &str| fault("dicomweb", reason);
     let url = Url::parse(text).map_err(|_| {
-        wrong("it is no URL; give the base of the DICOMweb service, such as https://pacs.example/dicom-web")
+        wrong("it is not a URL; give the base of the DICOMweb service, such as https://pacs.example/dicom-web")
     })?;
     if !matches!(url.scheme(), "http" | "https") {
         return Err(wrong("it must begin with https:// or http://"));

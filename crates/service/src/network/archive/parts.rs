@@ -44,7 +44,7 @@ impl SeriesParts {
             .and_then(|related| related.boundary)
             .ok_or_else(|| {
                 unexpected_answer(
-                    "The archive's answer is no `multipart/related` with DICOM files.",
+                    "The archive's answer is not `multipart/related` with DICOM files.",
                 )
             })?;
         let unparsed = Unparsed::default();

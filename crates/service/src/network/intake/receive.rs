@@ -437,7 +437,7 @@ fn examine(
     let mut opened = File::open(path).map_err(BlobError::from)?;
     // Before anything is unpacked: a packed file is none.
     if !is_file_of_ps310(&mut opened).map_err(BlobError::from)? {
-        let reason = "it is no file of PS3.10".to_owned();
+        let reason = "it is not a DICOM file (PS3.10)".to_owned();
         return Err(ReceiveError::NotUnderstood(reason));
     }
     let file = VolumeFile::named("the object", path);

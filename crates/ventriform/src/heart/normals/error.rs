@@ -7,7 +7,7 @@ use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NormalsError {
     /// It is no JSON, or has other fields.
-    #[error("this is no file of normal limits: {0}")]
+    #[error("this is not a file of normal limits: {0}")]
     Syntax(String),
     /// It was written for another version of the format.
     #[error(

@@ -166,7 +166,7 @@ pub struct ReaderProfile {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     /// It is no JSON, or has other fields.
-    #[error("this is no reader's profile: {0}")]
+    #[error("this is not a reader's profile: {0}")]
     Syntax(String),
     /// It was written by a program that knows more.
     #[error("the profile has version {0}; this program reads version {PROFILE_VERSION}")]

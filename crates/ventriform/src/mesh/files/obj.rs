@@ -88,7 +88,7 @@ pub(super) fn parse(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshF
                 let corners: Option<Vec<f64>> =
                     words.map(|word| corner(word, vertices.len())).collect();
                 let corners = corners.ok_or_else(|| {
-                    cursor.damaged("a corner of the face before here is no number of a vertex")
+                    cursor.damaged("a corner of the face before here is not the number of a vertex")
                 })?;
                 faces.polygon(corners, vertices.len())?;
             }

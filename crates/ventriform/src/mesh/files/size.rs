@@ -15,7 +15,7 @@ const MAX_EXTENT_MM: f64 = 500.0;
 
 /// An extent that is not that of an organ.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the mesh is {extent} {} across, which is no organ: one is {MIN_EXTENT_MM} to {MAX_EXTENT_MM} mm \
+#[error("the mesh is {extent} {} across; an organ is {MIN_EXTENT_MM} to {MAX_EXTENT_MM} mm \
     across{}", unit.as_str(), self.guess())]
 pub struct UnlikelySize {
     /// Greatest extent along an axis, in `unit`.

@@ -284,7 +284,7 @@ impl File<'_> {
         let numbers = bytes.chunks_exact(kind.bytes());
         match numbers.remainder() {
             [] => Ok(numbers.map(|n| kind.read(n, self.big_endian)).collect()),
-            _ => Err(broken("the bytes are no whole number of entries".into())),
+            _ => Err(broken("the bytes are not a whole number of entries".into())),
         }
     }
 
@@ -296,7 +296,8 @@ impl File<'_> {
                 let mut bytes = Vec::new();
                 while let Some(word) = cursor.word()? {
                     let code = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
-                    bytes.push(code.ok_or_else(|| cursor.damaged("a text is no list of codes"))?);
+                    bytes
+                        .push(code.ok_or_else(|| cursor.damaged("a text is not a list of codes"))?);
                 }
                 bytes
             }

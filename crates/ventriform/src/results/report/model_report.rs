@@ -207,7 +207,7 @@ fn volume_lost(surface: &SurfaceFacts, mesh: &MeshFacts) -> Option<String> {
 fn flags(mesh: &MeshFacts, surface: &SurfaceReport, tiled: &Tiled) -> Vec<String> {
     let mut flags = Vec::new();
     if let Some(defect) = &mesh.manifold.defect {
-        flags.push(format!("The model is no closed manifold: {defect}."));
+        flags.push(format!("The model is not a closed manifold: {defect}."));
     }
     if mesh.self_intersections > 0 {
         let n = mesh.self_intersections;

@@ -64,7 +64,7 @@ pub(super) fn polar_maps(
 /// For the hint at maps of uptake: whether normal limits stand beside them.
 pub(super) fn limits_hint(perfusion: Option<&PerfusionReport>) -> &'static str {
     match perfusion {
-        None => "There is no normal database behind them.",
+        None => "No normal limits were used.",
         Some(_) => "Comparison with normal limits: below.",
     }
 }

@@ -148,7 +148,7 @@ impl Trials {
         let failed = self.refused.iter().find(|refused| refused.name == name);
         let message = match failed {
             Some(refused) => format!("{name} could not be fitted: {}", refused.reason),
-            None => format!("{name} is none of the models that are fitted"),
+            None => format!("{name} is not among the fitted models"),
         };
         let fitted: Vec<&str> = self.candidates.iter().map(|c| c.name.as_str()).collect();
         ParameterError {

@@ -37,7 +37,7 @@ pub enum GivenMaskError {
     },
     /// Several structures may be meant.
     #[error(
-        "which of these structures is the mask cannot be told: {}",
+        "which of these structures is the mask is not stated: {}",
         list(present)
     )]
     SeveralStructures {
