@@ -16,5 +16,5 @@ const figures = Object.fromEntries(
 );
 mkdirSync("src/generated", { recursive: true });
 writeFileSync("src/generated/openapi.ts", `${HEAD}${astToString(types)}`);
-writeFileSync("src/generated/figures.ts", `${HEAD}export const FIGURES = ${JSON.stringify(figures, null, 2)};
-`);
+const rows = JSON.stringify(figures, null, 2);
+writeFileSync("src/generated/figures.ts", `${HEAD}export const FIGURES = ${rows};\n`);

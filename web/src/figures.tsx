@@ -31,7 +31,7 @@ function at(report: unknown, place: string): unknown {
 const holds = (found: unknown) => found !== undefined && found !== null && found !== false;
 
 /** The figure of `report`; nothing where it has none, or another one says more. */
-export function valueOf(row: Figure, report: unknown): number | undefined {
+export function figureOf(row: Figure, report: unknown): number | undefined {
   const value = at(report, row.place);
   const counts = (!row.needs || holds(at(report, row.needs))) && !(row.unless && holds(at(report, row.unless)));
   return counts && typeof value === "number" ? value : undefined;
@@ -65,7 +65,7 @@ interface PartProps<Part> {
 
 /** Parts of the wall with those of their figures that one of them has. */
 export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProps<Part>) {
-  const columns = rows.filter(row => row.headline && parts.some(part => valueOf(row, part) !== undefined));
+  const columns = rows.filter(row => row.headline && parts.some(part => figureOf(row, part) !== undefined));
   return (
     <table class="segments">
       <caption class="hidden">{caption}</caption>
@@ -84,7 +84,7 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProp
           <tr key={nameOf(part)}>
             <th scope="row">{nameOf(part)}</th>
             {columns.map(row => (
-              <td key={row.place}>{written(row, valueOf(row, part), false)}</td>
+              <td key={row.place}>{written(row, figureOf(row, part), false)}</td>
             ))}
           </tr>
         ))}
@@ -102,7 +102,7 @@ interface BesideProps {
 
 /** Figures of several things of one kind beside each other. */
 export function BesideTable({ caption, of, rows }: BesideProps) {
-  const filled = rows.filter(row => of.some(([, one]) => valueOf(row, one) !== undefined));
+  const filled = rows.filter(row => of.some(([, one]) => figureOf(row, one) !== undefined));
   return (
     <table>
       <caption class="hidden">{caption}</caption>
@@ -123,7 +123,7 @@ export function BesideTable({ caption, of, rows }: BesideProps) {
               {row.label}
             </th>
             {of.map(([name, one]) => (
-              <td key={name}>{written(row, valueOf(row, one))}</td>
+              <td key={name}>{written(row, figureOf(row, one))}</td>
             ))}
           </tr>
         ))}

@@ -152,7 +152,7 @@ export async function comparisons(tools) {
         ]);
         await chooser.setFiles([stress, rest]);
         await page.waitForSelector(".pair-form");
-        assert.match(await page.textContent(".pair-form"), /headers say which is which/);
+        assert.match(await page.textContent(".pair-form"), /Filled in from the headers/);
         assert.match(await page.textContent(".pair-choice:has(:checked)"), /Cardiac stress/);
         await look(page, `pair-form-${name}`);
         await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
@@ -249,7 +249,7 @@ export async function comparisons(tools) {
       // Files of one name in two folders are told apart by these.
       await page.setInputFiles("input[aria-label='Folder of scans']", folder);
       await page.waitForSelector(".pair-form");
-      assert.match(await page.textContent(".pair-form"), /Guessed from the names/);
+      assert.match(await page.textContent(".pair-form"), /Guessed from the file names/);
       assert.match(await page.textContent(".pair-choice:has(:checked)"), /^stress spect\.nii\.gz/);
       await page.getByRole("button", { name: "Not now" }).click();
       // Scans of two patients are named, and compared once the person says that they are one.

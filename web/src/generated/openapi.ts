@@ -277,7 +277,7 @@ export interface components {
              */
             gated?: boolean;
             /**
-             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @description Name (as in a report) of the fitted model to keep: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
              * @example built-in usual
              */
             kept_model?: string;
@@ -316,7 +316,7 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
-             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
              * @default auto
              * @enum {string}
              */
@@ -898,7 +898,7 @@ export interface components {
              */
             damping?: number;
             /**
-             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @description Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
              * @default apparent
              * @enum {string}
              */
@@ -909,7 +909,7 @@ export interface components {
              */
             gated?: boolean;
             /**
-             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @description Name (as in a report) of the fitted model to keep: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
              * @example built-in usual
              */
             kept_model?: string;
@@ -946,7 +946,7 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
-             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
              * @default auto
              * @enum {string}
              */
@@ -2037,6 +2037,7 @@ export interface components {
             /** @description Edges at each vertex. */
             valence: components["schemas"]["Histogram"];
         };
+        /** @description Why a volume is put on legal hold. */
         HoldRequest: {
             /**
              * @description Why the volume must be kept
@@ -2044,6 +2045,11 @@ export interface components {
              */
             reason: string;
         };
+        /**
+         * @description What is told of a job.
+         * @enum {string}
+         */
+        HookEvent: "started" | "succeeded" | "failed" | "cancelled";
         /** @description A summary of voxel values. */
         Intensity: {
             /**
@@ -3120,7 +3126,7 @@ export interface components {
              */
             damping?: number;
             /**
-             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @description Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
              * @default apparent
              * @enum {string}
              */
@@ -3156,7 +3162,7 @@ export interface components {
              */
             narrowing?: number;
             /**
-             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
              * @default auto
              * @enum {string}
              */
@@ -3306,7 +3312,7 @@ export interface components {
              */
             damping?: number;
             /**
-             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @description Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
              * @default apparent
              * @enum {string}
              */
@@ -3344,7 +3350,7 @@ export interface components {
              */
             narrowing?: number;
             /**
-             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
              * @default auto
              * @enum {string}
              */
@@ -4513,7 +4519,7 @@ export interface components {
              */
             damping?: number;
             /**
-             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @description Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
              * @default apparent
              * @enum {string}
              */
@@ -4523,12 +4529,12 @@ export interface components {
             /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
             frame?: number;
             /**
-             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @description Name (as in a report) of the fitted model to keep: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
              * @example built-in usual
              */
             kept_model?: string;
             /**
-             * @description Which structure of the expert's mask is meant, if the file holds several: the number of a label or segment, or the name or code of a segment. Default: the only one; of segments, the one coded as myocardium
+             * @description Structure of the expert's mask, if the file has several: the number of a label or segment, or the name or code of a segment. Default: the only one; of segments, the one coded as myocardium
              * @example 2, or the name of a DICOM segment
              */
             label?: string;
@@ -4581,7 +4587,7 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
-             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
              * @default auto
              * @enum {string}
              */
@@ -4828,13 +4834,17 @@ export interface components {
             to?: string;
             webhook?: components["schemas"]["WebhookRequest"];
         };
+        /** @description A series in an archive. */
         SourceRequest: {
             /**
              * @description Name of a configured archive
              * @example pacs
              */
             archive?: string;
-            /** @description Base URL of a DICOMweb service, instead of `archive`: of a configured archive, or of a host that the operator has allowed */
+            /**
+             * @description Base URL of a DICOMweb service, instead of `archive`: of a configured archive, or of a host that the operator has
+             *     allowed
+             */
             dicomweb?: string;
             /** @description Series Instance UID */
             series: string;
@@ -5186,6 +5196,7 @@ export interface components {
             /** @description The templates, newest first. */
             templates: components["schemas"]["Template"][];
         };
+        /** @description A JSON merge patch of a template's setting. */
         TemplatePatch: {
             /** @description Whether every `model=auto` fits the template */
             library?: boolean | null;
@@ -5601,11 +5612,13 @@ export interface components {
             /** @description The oldest first. */
             webhooks: components["schemas"]["Webhook"][];
         };
+        /** @description A receiver to be told about jobs. */
         WebhookRequest: {
             /** @description What to tell; the three ends of a job unless given */
-            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+            events?: components["schemas"]["HookEvent"][];
             /**
-             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never
+             *     shown again
              * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
              */
             secret?: string;
@@ -5705,6 +5718,7 @@ export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
 export type Histograms = components['schemas']['Histograms'];
 export type HoldRequest = components['schemas']['HoldRequest'];
+export type HookEvent = components['schemas']['HookEvent'];
 export type Intensity = components['schemas']['Intensity'];
 export type IntensityFacts = components['schemas']['IntensityFacts'];
 export type Job = components['schemas']['Job'];

@@ -1,7 +1,7 @@
 // What a comparison says in figures and words.
 
 import type { ComponentChildren } from "preact";
-import { BesideTable, PartTable, flatName, rowsOf, valueOf, written } from "../figures";
+import { BesideTable, PartTable, flatName, rowsOf, figureOf, written } from "../figures";
 import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
 import { Simulated } from "../limits";
 import { number } from "../words";
@@ -11,8 +11,8 @@ import { flagsOf, isSimulated } from "./compared";
 export function headlinesOf(report: ComparisonReport): [string, string, string][] {
   const beside = besideHeadlines(report);
   return rowsOf("ComparisonReport")
-    .filter(row => row.short && valueOf(row, report) !== undefined)
-    .map(row => [row.short!, written(row, valueOf(row, report)), beside[row.place] ?? ""]);
+    .filter(row => row.short && figureOf(row, report) !== undefined)
+    .map(row => [row.short!, written(row, figureOf(row, report)), beside[row.place] ?? ""]);
 }
 
 /** What stands beside a headline, by its place. */

@@ -108,8 +108,7 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
       </div>
       {!(compared.stress.oriented && compared.rest.oriented) && (
         <p class="warning">
-          The anterior side is unknown: segments have no names, and both hearts may be turned against each
-          other.
+          The anterior side is unknown: segments have no names, and both hearts may be turned against each other.
         </p>
       )}
     </section>

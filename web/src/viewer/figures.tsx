@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
-import { type Figure, flatName, intervalOf, rowsOf, valueOf, written } from "../figures";
+import { type Figure, flatName, intervalOf, rowsOf, figureOf, written } from "../figures";
 import type { Evidence } from "../generated/openapi";
 import type { Loaded } from "./loaded";
 
@@ -32,9 +32,9 @@ const HEADLINES = 5;
 export function headlines(shown: Loaded): [string, string, string][] {
   const { rows, report } = figuresOf(shown);
   return rows
-    .filter(row => row.headline && valueOf(row, report) !== undefined)
+    .filter(row => row.headline && figureOf(row, report) !== undefined)
     .slice(0, HEADLINES)
-    .map(row => [row.label, written(row, valueOf(row, report)), intervalOf(row, report)]);
+    .map(row => [row.label, written(row, figureOf(row, report)), intervalOf(row, report)]);
 }
 
 /** What a chance of a good fit says to a reader, from the greatest down. */
@@ -140,7 +140,7 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
           </tr>
         </thead>
         {sections.map(title => {
-          const filled = rows.filter(row => (row.section ?? "") === title && valueOf(row, figures) !== undefined);
+          const filled = rows.filter(row => (row.section ?? "") === title && figureOf(row, figures) !== undefined);
           if (filled.length === 0) return null;
           return (
             <tbody key={title}>
@@ -157,8 +157,8 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
                     {row.label}
                     {intervalOf(row, figures) && <span class="interval">90 %: {intervalOf(row, figures)}</span>}
                   </th>
-                  <td>{written(row, valueOf(row, figures))}</td>
-                  {other && <td>{written(row, valueOf(row, compared))}</td>}
+                  <td>{written(row, figureOf(row, figures))}</td>
+                  {other && <td>{written(row, figureOf(row, compared))}</td>}
                 </tr>
               ))}
             </tbody>

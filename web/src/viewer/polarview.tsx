@@ -133,9 +133,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
             {map.territories.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(" · ")}
           </p>
         )}
-        {map.orientation === "unknown" && (
-          <p class="warning">The anterior side is unknown: segments have no names.</p>
-        )}
+        {map.orientation === "unknown" && <p class="warning">The anterior side is unknown: segments have no names.</p>}
       </figcaption>
     </figure>
   );

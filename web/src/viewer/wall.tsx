@@ -267,11 +267,7 @@ export function Wall(props: Props) {
         aria-valuenow={0}
       />
       {title && <p class="tag">{title}</p>}
-      {plain && (
-        <p class="off">
-          This browser has no WebGL: the wall is drawn in a simple way and turns more slowly.
-        </p>
-      )}
+      {plain && <p class="off">This browser has no WebGL: the wall is drawn in a simple way and turns more slowly.</p>}
       <figcaption>
         <select
           aria-label="Colour of the wall"

@@ -615,7 +615,7 @@ fn the_page_has_figures_pictures_and_flags() {
     let [low, high] = report.ef_interval_percent.unwrap();
     for text in [
         format!("<b>{:.0} <small>%</small></b>", report.ef_percent.unwrap()),
-        format!("ejection fraction; 90 %: {low:.0} to {high:.0}"),
+        format!("Ejection fraction; 90 %: {low:.0} to {high:.0}"),
         format!("<b>{:.0} <small>ml</small></b>", report.edv_ml),
         "8 gates".to_owned(),
         format!("No rates: {}.", report.no_rates.clone().unwrap()),

@@ -154,7 +154,7 @@ fn broken_promises_are_reported() {
     assert!(
         open.warnings
             .iter()
-            .any(|w| w.contains("no closed manifold"))
+            .any(|w| w.contains("not a closed manifold"))
     );
 
     // A vertex of the outer wall drawn through the inner one.

@@ -500,7 +500,7 @@ mod tests {
         // What the script may draw is no part of what this page says.
         let page = page.split("<script").next().unwrap_or_default();
         assert!(page.contains("<h1>Organ: segmentation</h1>"));
-        assert!(page.contains("12.2 ") && page.contains("volume of the organ"));
+        assert!(page.contains("12.2 ") && page.contains("Volume"));
         for absent in [
             "cavity",
             "thickness",
