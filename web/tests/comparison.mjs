@@ -296,7 +296,7 @@ export async function comparisons(tools) {
     const points = Math.round(beat.ef_change_points);
     const shown = await page.textContent(".compared-headlines");
     const both = `${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`;
-    assert.ok(shown.includes(`EF, change${points > 0 ? "+" : ""}${points}points: ${both}`), shown);
+    assert.ok(shown.includes(`EF change${points > 0 ? "+" : ""}${number(points, 0, "points")}${both}`), shown);
     assert.ok(
       (await page.textContent(".particulars")).includes(
         `End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}${number(beat.rest_edv_ml, 0, "ml")}`,
@@ -392,7 +392,7 @@ export async function comparisons(tools) {
       const words = await page.textContent(".perfusion");
       for (const figure of [
         number(perfusion.deficit_percent, 1, "%"),
-        `${perfusion.summed_score} (`,
+        `Summed score${number(perfusion.summed_score, 0, "of 68")}`,
         "simulated people, not patients",
       ])
         assert.ok(words.includes(figure), `${figure} in ${words}`);

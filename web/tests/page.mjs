@@ -332,7 +332,7 @@ async function main() {
       await drawn(page);
       await page.waitForSelector(".wall canvas");
       await look(page, `fit-${name}`);
-      assert.match(await page.textContent(".figures"), /Cavity\s*\d+.ml/);
+      assert.match(await page.textContent(".figures"), /Cavity90 %: \d+ to \d+.ml/);
 
       // Every figure that the wall can be coloured by.
       const colours = page.getByLabel("Colour of the wall");

@@ -12,8 +12,10 @@ export function headlinesOf(report: ComparisonReport): [string, string, string][
   const beside = besideHeadlines(report);
   return rowsOf("ComparisonReport")
     .filter(row => row.short && figureOf(row, report) !== undefined)
-    .map(row => [row.short!, written(row, figureOf(row, report)), beside[row.place] ?? ""]);
+    .map(row => [capital(row.short!), written(row, figureOf(row, report)), beside[row.place] ?? ""]);
 }
+
+const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** What stands beside a headline, by its place. */
 function besideHeadlines(report: ComparisonReport): Record<string, string> {
