@@ -189,7 +189,7 @@ export async function comparisons(tools) {
       const lad = report.territories.find(one => one.name === "LAD");
       assert.ok(
         (await page.locator(".particulars tr", { hasText: "LAD" }).first().textContent()).includes(
-          number(lad.reversible_percent, 0, "%"),
+          number(lad.reversible_percent, 0),
         ),
       );
       await page.locator(".particulars summary", { hasText: "Segments" }).click();

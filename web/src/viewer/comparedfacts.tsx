@@ -108,7 +108,8 @@ export function LimitsUsed({ perfusion }: { perfusion: Perfusion }) {
 
 /** Deficit, extent and summed score of scans beside normal limits. */
 export function PerfusionTable({ of }: { of: [string, Perfusion][] }) {
-  return <BesideTable caption="Uptake beside normal limits" of={of} rows={rowsOf("Perfusion")} />;
+  const rows = rowsOf("Perfusion").filter(row => row.headline);
+  return <BesideTable caption="Uptake beside normal limits" of={of} rows={rows} />;
 }
 
 /** The rows of the figures that normal limits may have. */

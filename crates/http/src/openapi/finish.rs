@@ -20,6 +20,7 @@ use super::share::share;
 use super::walk::{answers, contents, operations};
 use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 use ventriform::results::figures;
 
 /// Requests and answers as a running service gave them.
@@ -27,6 +28,7 @@ const RECORDED_EXAMPLES: &str = include_str!("examples.json");
 
 /// Completes `document`.
 pub fn finish(document: &mut Value) {
+    sort_extensions(document);
     flatten(&mut document["components"]["schemas"]);
     with_width(&mut document["components"]["schemas"]);
     require_input(&mut document["components"]["schemas"]);
@@ -53,6 +55,27 @@ pub fn finish(document: &mut Value) {
     }
     document["components"]["examples"] = shared_examples(&recorded);
     share(document);
+}
+
+/// Puts the extensions of every object last, in the order of their names: utoipa has them in a map without order, and
+/// the document is the same bytes whenever it is made.
+fn sort_extensions(value: &mut Value) {
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(sort_extensions),
+        Value::Object(object) => {
+            let names: BTreeSet<String> = (object.keys())
+                .filter(|name| name.starts_with("x-"))
+                .cloned()
+                .collect();
+            for name in names {
+                if let Some(extension) = object.shift_remove(&name) {
+                    object.insert(name, extension);
+                }
+            }
+            object.values_mut().for_each(sort_extensions);
+        }
+        _ => {}
+    }
 }
 
 /// The media types of uploaded volumes that the document names beside `application/octet-stream`, which stands for all of
