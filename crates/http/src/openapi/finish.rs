@@ -11,7 +11,7 @@
 //! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
 //!    `scripts/check/contract.py`, and a command line for curl. A document has one example, under `components`.
 //! 6. Every operation takes `X-Request-Id`.
-//! 7. The schemas of reports get the rows of their figures: `x-figures` ([`figures`](ventriform::results::figures)).
+//! 7. The schemas of reports get the rows of their figures: `x-figures` ([`figures`]).
 //! 8. What several operations have alike stands under `components` ([`super::share`]).
 
 use super::bodies::{ANY_JOB_REQUESTS, job_discriminator, job_requests};
