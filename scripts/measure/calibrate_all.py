@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """Remakes every table and every constant that is estimated from simulated hearts.
 
-    calibrate_all.py CASES                     all of it: some 2,000 scans, a day on two cores
+    calibrate_all.py CASES                     all of it: some 2,000 scans; not run as a whole yet
     calibrate_all.py CASES --share 0.2         the same with a fifth of the cases, to see that it works, in a copy of
                                                the tree: rims cannot be estimated from fewer
     calibrate_all.py CASES --only volumes      one table, and the constants that come from it
 
-CASES is a folder for the simulated scans, 25 GB of them; those that are there are kept. In: seeds and kinds, which
+CASES is a folder for the simulated scans, an estimated 25 GB; those that are there are kept. In: seeds and kinds, which
 stand below. Out: the tables in scripts/measure/calibration, and by them
 
 - heart/judge/calibration.rs (calibrate.py)

@@ -10,8 +10,7 @@ use ventriform_dicom::write::code::{Code, loinc, sct};
 const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
 const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");
 
-/// The heading of how both scans were brought together.
-pub const MATCHED: &str = "How both scans were matched";
+const MATCHED: &str = "How both scans were matched";
 const BEAT: &str = "The beat at stress and at rest";
 
 /// The figures of a comparison.

@@ -18,6 +18,7 @@ mod unit;
 pub use crate::image::draw::document::HeadlineFigure;
 pub use unit::Unit;
 
+use crate::image::draw::table::{Table, TableColumn};
 use crate::image::draw::text::{number, signed};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -308,11 +309,23 @@ pub fn section(rows: &[Figure], section: &str, report: &impl Serialize) -> Vec<[
     .collect()
 }
 
-/// The figures of `part` in the columns of a table; a dash where there is none.
-pub fn cells(rows: &[Figure], part: &impl Serialize) -> Vec<String> {
-    let part = readable(part);
-    let cell = |row: &Figure| row.written(row.shown_value(&part).unwrap_or(f64::NAN));
-    rows.iter().map(cell).collect()
+/// A table of parts of a report: the names of each under `columns`, then its figures, a dash where it has none.
+pub fn table(
+    columns: impl IntoIterator<Item = TableColumn>,
+    rows: &[Figure],
+    parts: impl IntoIterator<Item = (Vec<String>, Value)>,
+) -> Table {
+    let heads = rows.iter().map(|row| TableColumn::number(row.column()));
+    let cell = |row: &Figure, part: &Value| row.written(row.shown_value(part).unwrap_or(f64::NAN));
+    Table {
+        columns: columns.into_iter().chain(heads).collect(),
+        rows: (parts.into_iter())
+            .map(|(mut names, part)| {
+                names.extend(rows.iter().map(|row| cell(row, &part)));
+                names
+            })
+            .collect(),
+    }
 }
 
 /// A line with the figures of `report` that have an abbreviation, such as `EDV 141 ml, ESV 42 ml`.

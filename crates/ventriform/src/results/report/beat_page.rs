@@ -8,12 +8,13 @@ use super::sections::Program;
 use super::summaries::object;
 use super::whose;
 use crate::image::draw::document::{self, HtmlDocument, Sign};
+use crate::image::draw::table::TableColumn;
 use crate::image::draw::text::{data_uri, number};
 use crate::image::draw::views;
 use crate::image::volume::Provenance;
 use crate::mesh::TriMesh;
 use crate::results::figures::beat::{FIGURES, SEGMENT_FIGURES};
-use crate::results::figures::{cells, headlines};
+use crate::results::figures::{self, headlines, readable};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -197,30 +198,13 @@ fn curves(page: &BeatPage) -> Markup {
 }
 
 fn segments(report: &BeatReport) -> Markup {
-    html! {
-        div {
-            div.scroll tabindex="0" role="group" aria-label="Table of segments, scrollable" {
-                table {
-                    thead {
-                        tr {
-                            th.n scope="col" { "No." }
-                            th scope="col" { "Segment" }
-                            @for row in SEGMENT_FIGURES { th.n scope="col" { (row.column()) } }
-                        }
-                    }
-                    tbody {
-                        @for segment in &report.segments {
-                            tr {
-                                td.n { (segment.segment) }
-                                th scope="row" { (segment.name) }
-                                @for cell in cells(SEGMENT_FIGURES, segment) { td.n { (cell) } }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let parts = report.segments.iter().map(|segment| {
+        let names = vec![segment.segment.to_string(), segment.name.clone()];
+        (names, readable(segment))
+    });
+    let columns = [TableColumn::number("No."), TableColumn::name("Segment")];
+    let table = figures::table(columns, SEGMENT_FIGURES, parts);
+    html! { div { (document::table(&table, "Table of segments")) } }
 }
 
 fn gates(report: &BeatReport) -> Markup {

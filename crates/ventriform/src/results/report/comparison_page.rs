@@ -10,7 +10,7 @@ use crate::image::draw::table::{Table, TableColumn};
 use crate::image::draw::text::{data_uri, number};
 use crate::image::volume::Provenance;
 use crate::results::figures::comparison::{FIGURES, SEGMENT_FIGURES, TERRITORY_FIGURES};
-use crate::results::figures::{Figure, cells, headlines, readable};
+use crate::results::figures::{self, Figure, headlines, readable};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -198,21 +198,10 @@ fn slices(page: &ComparisonPage) -> Markup {
 
 /// The walls of the arteries; `None` if there are none.
 pub(super) fn territory_table(report: &ComparisonReport) -> Option<Table> {
-    let rows = report.territories.iter().map(|territory| {
-        let name = [territory.name.clone()];
-        let figures = cells(TERRITORY_FIGURES, territory);
-        name.into_iter().chain(figures).collect()
-    });
-    let heads = TERRITORY_FIGURES
-        .iter()
-        .map(|row| TableColumn::number(row.column()));
-    (!report.territories.is_empty()).then(|| Table {
-        columns: [TableColumn::name("Territory")]
-            .into_iter()
-            .chain(heads)
-            .collect(),
-        rows: rows.collect(),
-    })
+    let parts = report.territories.iter();
+    let parts = parts.map(|territory| (vec![territory.name.clone()], readable(territory)));
+    let columns = [TableColumn::name("Territory")];
+    (!report.territories.is_empty()).then(|| figures::table(columns, TERRITORY_FIGURES, parts))
 }
 
 fn territories(report: &ComparisonReport) -> Markup {
@@ -226,19 +215,11 @@ fn territories(report: &ComparisonReport) -> Markup {
 pub(super) fn segment_table(report: &ComparisonReport) -> Table {
     let segments: Vec<Value> = report.segments.iter().map(readable).collect();
     let has = |row: &Figure| segments.iter().any(|segment| row.value(segment).is_some());
-    let figures: Vec<Figure> = SEGMENT_FIGURES.iter().copied().filter(has).collect();
-    let heads = figures.iter().map(|row| TableColumn::number(row.column()));
-    let rows = report.segments.iter().map(|segment| {
-        let names = [segment.segment.to_string(), segment.name.clone()];
-        names.into_iter().chain(cells(&figures, segment)).collect()
-    });
-    Table {
-        columns: [TableColumn::number("No."), TableColumn::name("Segment")]
-            .into_iter()
-            .chain(heads)
-            .collect(),
-        rows: rows.collect(),
-    }
+    let rows: Vec<Figure> = SEGMENT_FIGURES.iter().copied().filter(has).collect();
+    let names = report.segments.iter();
+    let names = names.map(|segment| vec![segment.segment.to_string(), segment.name.clone()]);
+    let columns = [TableColumn::number("No."), TableColumn::name("Segment")];
+    figures::table(columns, &rows, names.zip(segments))
 }
 
 /// The known facts of both scans, side by side. Of scans that are not `named`, the description is left out: it may say

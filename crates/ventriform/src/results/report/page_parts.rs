@@ -6,7 +6,7 @@ use crate::image::draw::document::{self, Sign};
 use crate::image::draw::table::{Table, TableColumn};
 use crate::image::draw::text::{data_uri, number};
 use crate::results::figures::perfusion::{FIGURES, SEGMENT_FIGURES};
-use crate::results::figures::{Figure, cells, headlines};
+use crate::results::figures::{self, Figure, headlines, readable};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
@@ -91,23 +91,14 @@ pub(super) fn limits_line(perfusion: &PerfusionReport) -> String {
 
 /// The segments beside normal limits.
 pub(super) fn score_table(perfusion: &PerfusionReport) -> Table {
-    let rows: Vec<Figure> = SEGMENT_FIGURES
-        .iter()
-        .copied()
-        .filter(|row| row.headline)
-        .collect();
-    let heads = rows.iter().map(|row| TableColumn::number(row.column()));
-    let segments = perfusion.segments.iter().map(|segment| {
-        let names = [segment.segment.to_string(), segment.name.clone()];
-        names.into_iter().chain(cells(&rows, segment)).collect()
+    let rows = SEGMENT_FIGURES.iter().copied().filter(|row| row.headline);
+    let rows: Vec<Figure> = rows.collect();
+    let parts = perfusion.segments.iter().map(|segment| {
+        let names = vec![segment.segment.to_string(), segment.name.clone()];
+        (names, readable(segment))
     });
-    Table {
-        columns: [TableColumn::number("No."), TableColumn::name("Segment")]
-            .into_iter()
-            .chain(heads)
-            .collect(),
-        rows: segments.collect(),
-    }
+    let columns = [TableColumn::number("No."), TableColumn::name("Segment")];
+    figures::table(columns, &rows, parts)
 }
 
 /// The wall beside normal limits, if some were given.

@@ -13,7 +13,7 @@ use crate::image::draw::views;
 use crate::image::volume::Provenance;
 use crate::mesh::TriMesh;
 use crate::results::figures::segmentation::{AGAINST_THE_EXPERT, FIGURES, SEGMENT_FIGURES};
-use crate::results::figures::{cells, headlines, section};
+use crate::results::figures::{self, headlines, readable, section};
 use maud::{Markup, html};
 use serde_json::{Value, json};
 
@@ -311,34 +311,23 @@ pub(super) fn polar_hint(report: &SegmentationReport) -> String {
 
 /// Uptake of the segments and of the arteries' territories; `None` without a polar map.
 pub(super) fn uptake_table(report: &SegmentationReport) -> Option<Table> {
-    let figures = report.polar.as_ref()?;
-    let segments = figures.segments.iter().map(|segment| {
+    let polar = report.polar.as_ref()?;
+    let segments = polar.segments.iter().map(|segment| {
         let artery = segment.territory.clone().unwrap_or("–".to_owned());
-        let names = [segment.number.to_string(), segment.name.clone(), artery];
-        names
-            .into_iter()
-            .chain(cells(SEGMENT_FIGURES, segment))
-            .collect()
+        let names = vec![segment.number.to_string(), segment.name.clone(), artery];
+        (names, readable(segment))
     });
-    let territories = figures.territories.iter().map(|territory| {
+    let territories = polar.territories.iter().map(|territory| {
         let names = ["", "all of the territory", &territory.name].map(str::to_owned);
-        names
-            .into_iter()
-            .chain(cells(SEGMENT_FIGURES, territory))
-            .collect()
+        (names.into(), readable(territory))
     });
-    let heads = SEGMENT_FIGURES
-        .iter()
-        .map(|row| TableColumn::number(row.column()));
-    let names = [
+    let columns = [
         TableColumn::number("No."),
         TableColumn::name("Segment"),
         TableColumn::text("Artery"),
     ];
-    Some(Table {
-        columns: names.into_iter().chain(heads).collect(),
-        rows: segments.chain(territories).collect(),
-    })
+    let parts = segments.chain(territories);
+    Some(figures::table(columns, SEGMENT_FIGURES, parts))
 }
 
 /// The polar map beside its segments.

@@ -90,8 +90,8 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
 }
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
-    let mut groups = vec![whole(results)];
     let report = results.figures.map(readable);
+    let mut groups = vec![whole(results, report.as_ref())];
     let parts = PARTS.iter();
     groups.extend(parts.filter_map(|part| part_group(results, report.as_ref()?, part)));
     let polar = results.figures.and_then(|report| report.polar.as_ref());
@@ -123,7 +123,7 @@ fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
 }
 
 /// The group of the whole structure.
-fn whole(results: &DicomResults<'_>) -> DataSet {
+fn whole(results: &DicomResults<'_>, figures: Option<&Value>) -> DataSet {
     let structure = results.structure;
     let mut content = tracking(structure.label, &results.tracking());
     content.push(concept(
@@ -147,8 +147,8 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
             ));
         }
     }
+    content.extend((figures.iter()).flat_map(|report| measured(report, FIGURES, Group::Whole)));
     if let Some(report) = results.figures {
-        content.extend(measured(&readable(report), FIGURES, Group::Whole));
         let comment = dcm("121106", "Comment");
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
