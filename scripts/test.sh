@@ -33,8 +33,12 @@ count() {
 # check NAME COMMAND...: runs the command and counts it.
 check() {
   say "$1"
-  timed "$@"
-  count "$1" $?
+  local printed
+  printed=$(mktemp -p "$tools")
+  timed "$@" 2>&1 | tee "$printed"
+  local status=${PIPESTATUS[0]}
+  count "$1" "$status"
+  if [ "$status" -eq 0 ]; then rm "$printed"; else failed_logs+=("$printed"); fi
 }
 # timed NAME COMMAND...: runs the command, and prints how long it took.
 timed() {

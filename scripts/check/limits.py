@@ -832,7 +832,18 @@ ATTACKS = [
 MOST_MEBIBYTES = 640
 
 
+LATE = "an honest request took too long"
+
+
+def withstood(attack, program, patience):
+    """Whether the service withstands the attack. Another program may have taken the processors while a client
+    waited: what is late alone is tried once more."""
+    wrong = attempt(attack, program, patience)
+    return not (attempt(attack, program, patience) if wrong == [LATE] else wrong)
+
+
 def attempt(attack, program, patience):
+    """What is wrong under the attack."""
     began = time.time()
     with tempfile.TemporaryDirectory() as folder:
         service = start(program, folder + "/data", "--queue-limit", "1000", *FLAGS.get(attack, []))
@@ -849,7 +860,7 @@ def attempt(attack, program, patience):
             wrong.append(f"the service died: {service.process.poll()}")
         else:
             most = service.figure("VmHWM") >> 10
-            said += f", at most {most} MiB"
+            said += f", at most {most} MiB, {service.processor_time():.0f} s of processor time"
             if most > MOST_MEBIBYTES:
                 wrong.append("the budgets do not bound the memory")
             status, _ = service.ask("GET", "/readyz")
@@ -858,7 +869,7 @@ def attempt(attack, program, patience):
         if honest.refused:
             wrong.append(f"refused: {honest.refused[:3]}")
         if honest.slowest[0] > patience:
-            wrong.append("an honest request took too long")
+            wrong.append(LATE)
         stop(service)
         slowest = f"slowest of {honest.asked} honest requests {honest.slowest[0]:.2f} s ({honest.slowest[1]})"
         took = time.time() - began
@@ -866,7 +877,7 @@ def attempt(attack, program, patience):
             f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {took:.0f} s; {slowest} {'; '.join(wrong)}",
             flush=True,
         )
-        return not wrong
+        return wrong
 
 
 def main():
@@ -876,7 +887,7 @@ def main():
     parser.add_argument("attacks", nargs="*")
     given = parser.parse_args()
     chosen = [attack for attack in ATTACKS if not given.attacks or attack.__name__ in given.attacks]
-    done = [attempt(attack, os.path.abspath(given.program), given.patience) for attack in chosen]
+    done = [withstood(attack, os.path.abspath(given.program), given.patience) for attack in chosen]
     sys.exit(not all(done))
 
 

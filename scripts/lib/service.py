@@ -134,6 +134,12 @@ class Service:
         with open(f"/proc/{self.process.pid}/status") as status:
             return int(re.search(name + r":\s+(\d+)", status.read())[1])
 
+    def processor_time(self):
+        """Seconds that the process has computed."""
+        with open(f"/proc/{self.process.pid}/stat") as stat:
+            user, system = stat.read().rpartition(")")[2].split()[11:13]
+        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
     def kill(self):
         self.process.kill()
         self.process.wait()

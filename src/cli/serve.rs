@@ -12,6 +12,7 @@ use tokio::runtime::Runtime;
 use ventriform::image::volume::ReadLimits;
 use ventriform_service::config::{Flags, Settings};
 use ventriform_service::jobs::{Isolation, serve_isolated};
+use ventriform_service::network;
 use ventriform_service::work::Engine;
 
 /// Time for which the health check waits for an answer.
@@ -256,7 +257,7 @@ pub(super) fn variable(name: &str) -> Option<String> {
 }
 
 fn bind(listen: SocketAddr) -> Result<TcpListener> {
-    TcpListener::bind(listen).with_context(|| {
+    network::listen::listen(listen).with_context(|| {
         format!(
             "cannot listen on {listen} (--listen); give another address of this machine, such as 127.0.0.1:8081, or \
              port 0 for any free port"

@@ -6,6 +6,7 @@ use crate::network::intake::{
     HeaderTurns, HeaderWork, IntakeRoom, Listener, ReceiveError, ReceiverSettings, ScpSettings,
     Senders, TlsConfiguration, Waits,
 };
+use crate::network::listen::listen;
 use crate::run::start::StartError;
 use crate::use_cases::service::Service;
 use async_trait::async_trait;
@@ -75,7 +76,7 @@ impl DicomListener {
         if scp.senders.others && !loopback {
             tracing::warn!(%address, "every system may send images by DICOM (allow_anonymous)");
         }
-        let listener = TcpListener::bind(address).map_err(unusable)?;
+        let listener = listen(address).map_err(unusable)?;
         listener.set_nonblocking(true).map_err(unusable)?;
         Ok(Some(Self {
             address: listener.local_addr().map_err(unusable)?,
