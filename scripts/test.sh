@@ -217,9 +217,11 @@ else
   echo "could not install the tools for the external checks"
   failed=$((failed + 1))
 fi
-# Alone, since they measure how long a request takes, and a browser on busy processors is slow.
+# Alone, since they measure how long a request takes, and a browser on busy processors is slow. The service is compiled
+# without optimisation here: beside 900 half uploads an honest request
+# takes up to 2.2 s on two quiet cores.
 [ -n "${PYTHON:-}" ] && check "attacks of one client under a limit of memory" \
-  "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 3
+  "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 6
 check "page in a browser" scripts/check/page.sh
 check "site of the docs: links, search, nothing from elsewhere" scripts/release/site.sh --check
 check "demo" scripts/check/demo.sh
