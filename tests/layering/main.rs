@@ -106,6 +106,7 @@ const SERVICE_ROOMS: &[&str] = &[
     "callers",
     "items",
     "jobs",
+    "network/listen",
     "network/hooks",
     "network/archive",
     "network/intake",
