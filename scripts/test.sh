@@ -15,30 +15,28 @@ tools=$test_tools
 log=$PWD/target/test-log.txt
 mkdir -p "$tools"
 : >"$log"
-passed=0 failed=0 skipped=0
+passed=0 failed=0 skipped=0 checks=0
 failures=() failed_logs=()
 
 say() { printf '\n== %s (after %d s)\n' "$*" "$SECONDS"; }
 
-# count NAME STATUS: prints the result of a check and counts it as passed or failed.
+# count NAME STATUS [LOG]: prints the result of a check and counts it as passed or failed; LOG holds what it printed.
 count() {
   if [ "$2" -eq 0 ]; then
     passed=$((passed + 1)) && echo "ok: $1"
   else
     failed=$((failed + 1)) && echo "FAILED: $1"
     failures+=("$1")
+    [ -z "${3:-}" ] || failed_logs+=("$3")
   fi
 }
 
 # check NAME COMMAND...: runs the command and counts it.
 check() {
   say "$1"
-  local printed
-  printed=$(mktemp -p "$tools")
+  local printed=$tools/check-$((++checks)).log
   timed "$@" 2>&1 | tee "$printed"
-  local status=${PIPESTATUS[0]}
-  count "$1" "$status"
-  if [ "$status" -eq 0 ]; then rm "$printed"; else failed_logs+=("$printed"); fi
+  count "$1" "${PIPESTATUS[0]}" "$printed"
 }
 # timed NAME COMMAND...: runs the command, and prints how long it took.
 timed() {
@@ -61,8 +59,7 @@ collect() {
   local status=$?
   say "$2"
   cat "$tools/$1.log"
-  count "$2" $status
-  [ "$status" -eq 0 ] || failed_logs+=("$tools/$1.log")
+  count "$2" $status "$tools/$1.log"
 }
 
 # Names all that failed once more, with what it printed: the end of a long log is read first.
@@ -217,11 +214,9 @@ else
   echo "could not install the tools for the external checks"
   failed=$((failed + 1))
 fi
-# Alone, since they measure how long a request takes, and a browser on busy processors is slow. The service is compiled
-# without optimisation here: beside 900 half uploads an honest request
-# takes up to 2.2 s on two quiet cores.
+# Alone, since they measure how long a request takes, and a browser on busy processors is slow.
 [ -n "${PYTHON:-}" ] && check "attacks of one client under a limit of memory" \
-  "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 6
+  "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 3
 check "page in a browser" scripts/check/page.sh
 check "site of the docs: links, search, nothing from elsewhere" scripts/release/site.sh --check
 check "demo" scripts/check/demo.sh

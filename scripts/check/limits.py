@@ -839,7 +839,9 @@ def withstood(attack, program, patience):
     """Whether the service withstands the attack. Another program may have taken the processors while a client
     waited: what is late alone is tried once more."""
     wrong = attempt(attack, program, patience)
-    return not (attempt(attack, program, patience) if wrong == [LATE] else wrong)
+    if wrong == [LATE]:
+        wrong = attempt(attack, program, patience)
+    return not wrong
 
 
 def attempt(attack, program, patience):
