@@ -11,6 +11,7 @@ stand below. Out: the tables in scripts/measure/calibration, and by them
 
 - heart/judge/calibration.rs (calibrate.py)
 - heart/deform/calibration.rs and heart/judge/uncertainty_calibration.rs (calibrate_walls.py)
+- heart/deform/thickness_calibration.rs (calibrate_thickness.py)
 - heart/beat/calibration.rs and heart/judge/volume_calibration.rs (calibrate_intervals.py)
 - heart/comparison/calibration.rs (calibrate_comparison.py)
 
@@ -59,15 +60,21 @@ SETS = {
     "9001": (9001, 12, SEEN, True),
     "9101": (9101, 12, SEEN, True),
     "9111": (9111, 94, SEEN, True),
+    "6003": (6003, 84, ALL, True),
+    "6007": (6007, 48, "filter,camera,cut,few", True),
+    "6009": (6009, 40, "filter", True),
     "9301": (9301, 1000, ALL, True),
 }
 OF_FEATURES = [name for name in SETS if name not in ("9001", "9101", "9111")]
 OF_WALLS = ["cohort", "411", "701", "702", "703", "704", "2101", "2104", "9001", "9101", "9111"]
 OF_SMOOTHNESS = ["cohort", "5001"]
-OF_VOLUMES = ["5001"]
+OF_VOLUMES = ["6003", "6007", "6009"]
 # Seeds and numbers of gated studies, and of pairs without gates.
 BEATS = {"500": (500, 20), "501": (501, 20)}
 PAIRS = {"610": (610, 20)}
+# Seed and number of hearts with walls of every thickness, and of gated ones.
+OF_THICKNESS = {"6001": (6001, 120)}
+BEATS_OF_THICKNESS = {"7103": (7103, 16)}
 
 
 class Lab:
@@ -105,6 +112,12 @@ class Lab:
             folders.append(out)
         return folders
 
+    def walls(self, sets):
+        """The folders of hearts with walls of every thickness, made if they are not there."""
+        for name, (seed, whole) in sets.items():
+            self.run("simulate", "walls", "--seed", seed, "--n", self.number(whole), "--out", self.cases / name)
+        return [self.cases / name for name in sets]
+
     def studies(self, kind, sets, *more):
         folders = []
         for name, (seed, whole) in sets.items():
@@ -126,12 +139,15 @@ def walls(lab):
 
 
 def volumes(lab):
-    lab.run("volumes", *lab.scans(OF_VOLUMES), into=TABLES / "volumes.csv")
+    folders = lab.walls(OF_THICKNESS) + lab.scans(OF_VOLUMES)
+    lab.run("volumes", *folders, into=TABLES / "volumes.csv")
+    script("calibrate_thickness.py", "--write")
     script("calibrate_intervals.py", "--write", "volumes")
 
 
 def beats(lab):
-    lab.run("beats", *lab.studies("gated", BEATS), into=TABLES / "beats.csv")
+    studies = lab.studies("gated", BEATS) + lab.studies("walls", BEATS_OF_THICKNESS, "--gates", 8)
+    lab.run("beats", *studies, into=TABLES / "beats.csv")
     script("calibrate_intervals.py", "--write", "beats")
 
 

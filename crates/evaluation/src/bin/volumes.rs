@@ -4,7 +4,9 @@
 //! `cargo run --release -p ventriform-evaluation --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every
 //! case in the folders. TABLE has a row for each heart that is not refused: the folder's name, the case's, the volumes
 //! of the anatomical wall and of its cavity, found and true (`params.json`, "result"), ml, the share of the wall that
-//! is dark, the resolution, mm, and the confidence.
+//! is dark, the resolution, mm, the confidence, the mean thickness of the wall, found and true, its deviation and the
+//! ends of its interval, mm, and what it follows from: how thick the wall looks, mm, and how large its cavity, ml, how
+//! thick usual walls that look so are, and the length of the image's noise, mm.
 
 use std::path::Path;
 
@@ -21,7 +23,11 @@ fn main() -> Result<()> {
         .par_iter()
         .map(|(set, case)| row(set, case))
         .collect::<Result<_>>()?;
-    println!("set,case,wall,true_wall,cavity,true_cavity,dark,resolution_mm,confidence");
+    println!(
+        "set,case,wall,true_wall,cavity,true_cavity,dark,resolution_mm,confidence,\
+         thickness,true_thickness,\
+         thickness_sd,least_thickness,greatest_thickness,apparent_mm,apparent_cavity,usual_mm,noise_length_mm"
+    );
     rows.iter().flatten().for_each(|row| println!("{row}"));
     Ok(())
 }
@@ -41,9 +47,13 @@ fn row(set: &str, case: &Path) -> Result<Option<String>> {
     let (Some(both), Some(evidence)) = (&fit.model.surfaces, &fit.judgement.evidence) else {
         return Ok(None);
     };
+    let Some(thickness) = both.thickness else {
+        return Ok(None);
+    };
     let resolution = made.segmentation.resolution.map_or(f64::NAN, |r| r.value);
     Ok(Some(format!(
-        "{set},{},{:.2},{:.2},{:.2},{:.2},{:.4},{resolution:.2},{:.3}",
+        "{set},{},{:.2},{:.2},{:.2},{:.2},{:.4},{resolution:.2},{:.3},{:.2},{:.2},{:.3},\
+         {:.2},{:.2},{:.2},{:.2},{:.2},{:.3}",
         name_of(case),
         both.anatomical.wall_ml,
         truth("wall_ml"),
@@ -51,5 +61,14 @@ fn row(set: &str, case: &Path) -> Result<Option<String>> {
         truth("cavity_ml"),
         evidence.dark,
         fit.judgement.confidence,
+        both.anatomical.wall.thickness,
+        truth("wall_thickness_mean_mm"),
+        thickness.sd_mm,
+        thickness.interval_mm[0],
+        thickness.interval_mm[1],
+        thickness.look.apparent_mm,
+        thickness.look.cavity_ml,
+        thickness.look.usual_mm,
+        thickness.look.noise_length_mm.unwrap_or(f64::NAN),
     )))
 }

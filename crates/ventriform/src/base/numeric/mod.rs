@@ -6,6 +6,7 @@
 //! - [`disjoint_sets`]: union-find on a list of parents;
 //! - [`error_terms`]: the error of a volume, and the interval that holds the true one;
 //! - [`lbfgs`]: the minimum of a smooth function within bounds;
+//! - [`normal`]: the normal distribution;
 //! - [`order`]: order statistics;
 //! - [`round_step`]: round numbers for scales.
 
@@ -15,5 +16,6 @@ pub mod decimals;
 pub mod disjoint_sets;
 pub mod error_terms;
 pub mod lbfgs;
+pub mod normal;
 pub mod order;
 pub mod round_step;

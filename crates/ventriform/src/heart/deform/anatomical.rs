@@ -10,10 +10,12 @@
 //! 2. Two linear functions of these numbers ([`INNER_SHIFT_MM`], [`OUTER_SHIFT_MM`]) are the distances by which the
 //!    two surfaces move along the ray. In an image smoother than usual ([`smoothness`](crate::image::grid::smoothness)), both
 //!    move farther ([`SMOOTHNESS_SHIFT`]).
-//! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
+//! 3. These distances are those of usual walls. The mean thickness is known from the wall's width as far as that tells it
+//!    ([`wall_thickness`](super::wall_thickness)): all distances are scaled so that it is left.
+//! 4. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
-//! The coefficients are a least-squares fit to simulated hearts whose walls are known;
+//! The coefficients are a least-squares fit to simulated hearts with usual walls, which are known;
 //! `scripts/measure/calibrate_walls.py` estimates them again. Two other
 //! ways were tried on the same hearts and came out behind. A fixed shift of both surfaces makes
 //! small hearts too thin. A forward model (the wall rendered, blurred and compared with the image)
@@ -21,15 +23,16 @@
 //! at the same width for all hearts, whatever their filter.
 //!
 //! Not guaranteed: a single heart's wall. Beating and breathing blur the wall as much as the camera
-//! does and cannot be measured in an image that is not gated; the mean thickness of a heart scatters
-//! by about 0.9 mm about the true one. No figure of the image that was tried tells the rest (14 of them on 65 hearts,
+//! does and cannot be measured in an image that is not gated; the mean thickness of a usual heart scatters
+//! by about 1.2 mm about the true one. No figure of the image that was tried tells the rest (14 of them on 65 hearts,
 //! each left out): hollowness, uptake, thickness, strength of the edges and the like.
 
-use super::blur_correction;
 use super::calibration::{
     CAVITY_SIZE_SHIFT, INNER_SHIFT_MM, NARROW_CAVITY_SHIFT, OUTER_SHIFT_MM, SMOOTHNESS_SHIFT,
 };
 use super::ray_terms::{RayTerms, SmoothnessShift};
+use super::thickness_calibration::MEAN_THICKNESS_SHIFT_MM;
+use super::wall_thickness::{WallLook, WallThickness};
 use crate::base::geometry::Vec3;
 use crate::base::numeric::order;
 use crate::heart::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
@@ -50,17 +53,21 @@ pub struct BlurredImage<'a> {
     pub field: &'a Field,
     /// Its smoothness, mm.
     pub smoothness_mm: Option<f64>,
+    /// The length of its noise, mm.
+    pub noise_length_mm: Option<f64>,
     /// The image's resolution (full width of a point at half its maximum, mm), if it is stated.
     pub resolution_mm: Option<f64>,
 }
 
-/// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall. If the resolution of the
-/// `image` is stated, the mean loss of thickness is what a slab under that blur gains
-/// ([`blur_correction::excess`]); otherwise it comes from the calibration. Where a direction has no
-/// wall at all, the mesh stays.
-pub fn anatomical_mesh(mesh: &TriMesh, wall: &VentricleWall, image: &BlurredImage<'_>) -> TriMesh {
+/// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall, and what is known of that
+/// wall's thickness. Where a direction has no wall at all, the mesh stays, and nothing is known.
+pub fn anatomical_mesh(
+    mesh: &TriMesh,
+    wall: &VentricleWall,
+    image: &BlurredImage<'_>,
+) -> (TriMesh, Option<WallThickness>) {
     let Some(shifts) = WallShifts::new(wall, image) else {
-        return mesh.clone();
+        return (mesh.clone(), None);
     };
     let moved = |share: f64| {
         let mut moved = mesh.clone();
@@ -70,11 +77,12 @@ pub fn anatomical_mesh(mesh: &TriMesh, wall: &VentricleWall, image: &BlurredImag
         moved
     };
     // Large triangles may still cut through a thin wall.
-    [1.0, 0.75, 0.5, 0.25]
+    let moved = [1.0, 0.75, 0.5, 0.25]
         .into_iter()
         .map(moved)
         .find(|moved| self_intersections(moved).is_empty())
-        .unwrap_or_else(|| mesh.clone())
+        .unwrap_or_else(|| mesh.clone());
+    (moved, Some(shifts.thickness))
 }
 
 /// Beginning and end of the wall on each ray, and the distances by which its surfaces move outward, mm.
@@ -83,6 +91,8 @@ struct WallShifts {
     outer: RayMap,
     inner_shift: RayMap,
     outer_shift: RayMap,
+    /// The mean thickness that the shifts leave.
+    thickness: WallThickness,
 }
 
 impl WallShifts {
@@ -100,13 +110,23 @@ impl WallShifts {
         {
             shift.0.iter_mut().for_each(|x| *x += more.0 + more.1);
         }
-        if let Some(resolution) = image.resolution_mm {
-            let loss = mean_difference(&inner_shift, &outer_shift);
-            let known = blur_correction::excess(mean_difference(&outer, &inner), resolution);
-            let factor = if loss > 1e-3 { known / loss } else { 1.0 };
-            for shift in [&mut inner_shift, &mut outer_shift] {
-                shift.0.iter_mut().for_each(|x| *x *= factor);
-            }
+        let apparent_mm = mean_difference(&outer, &inner);
+        let usual_loss_mm = mean_difference(&inner_shift, &outer_shift);
+        let thickness = WallThickness::new(&WallLook {
+            apparent_mm,
+            cavity_ml: wall.cavity_ml,
+            usual_mm: apparent_mm - usual_loss_mm + MEAN_THICKNESS_SHIFT_MM,
+            noise_length_mm: image.noise_length_mm,
+            resolution_mm: image.resolution_mm,
+        });
+        let loss_mm = (apparent_mm - (thickness.mean_mm - MEAN_THICKNESS_SHIFT_MM)).max(0.0);
+        let factor = if usual_loss_mm > 1e-3 {
+            loss_mm / usual_loss_mm
+        } else {
+            1.0
+        };
+        for shift in [&mut inner_shift, &mut outer_shift] {
+            shift.0.iter_mut().for_each(|x| *x *= factor);
         }
         keep_thinnest([&inner, &outer], [&mut inner_shift, &mut outer_shift]);
         Some(Self {
@@ -114,6 +134,7 @@ impl WallShifts {
             outer,
             inner_shift,
             outer_shift,
+            thickness,
         })
     }
 
@@ -481,10 +502,10 @@ mod tests {
         );
     }
 
-    /// The mean wall loses as much as blur adds to a slab of its thickness; no wall gets thinner than the
-    /// least thickness.
+    /// The mean wall that is left has the thickness that was found, and the blurrier the image, the less is left; no wall
+    /// gets thinner than the least thickness.
     #[test]
-    fn a_known_resolution_sets_the_mean_loss_and_some_wall_is_left() {
+    fn the_thickness_that_was_found_is_left_and_some_wall_everywhere() {
         use crate::base::geometry::frame::VoxelToPatient;
         use crate::base::progress::Monitor;
         use crate::image::grid::Volume;
@@ -505,18 +526,21 @@ mod tests {
             let image = BlurredImage {
                 field: &image,
                 smoothness_mm: None,
+                noise_length_mm: None,
                 resolution_mm,
             };
             WallShifts::new(&wall, &image).unwrap()
         };
-        for resolution in [8.0, 12.0] {
-            let shifts = of(16.0, Some(resolution));
+        let left = [13.0, 15.0].map(|resolution| {
+            let shifts = of(17.0, Some(resolution));
             let mean = |map: &RayMap| map.0.iter().sum::<f64>() / map.0.len() as f64;
             let loss = mean(&shifts.inner_shift) - mean(&shifts.outer_shift);
-            let thickness = mean(&shifts.outer) - mean(&shifts.inner);
-            let excess = blur_correction::excess(thickness, resolution);
-            assert!((loss - excess).abs() < 1e-6, "{loss} {excess}");
-        }
+            let left = mean(&shifts.outer) - mean(&shifts.inner) - loss;
+            let found = shifts.thickness.mean_mm - MEAN_THICKNESS_SHIFT_MM;
+            assert!((left - found).abs() < 1e-6, "{left} {found}");
+            left
+        });
+        assert!(left[1] < left[0] && left[0] < 17.0, "{left:?}");
         let thin = of(6.0, None);
         for index in 0..RAY_ROWS * RAY_COLUMNS {
             let before = thin.outer.0[index] - thin.inner.0[index];

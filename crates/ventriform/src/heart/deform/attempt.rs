@@ -147,6 +147,7 @@ impl Attempt {
                 let image = BlurredImage {
                     field: &setup.field,
                     smoothness_mm: setup.smoothness_mm,
+                    noise_length_mm: setup.noise_length_mm,
                     resolution_mm: parameters.resolution,
                 };
                 let both = WallSurfaces::new(apparent, cup, &orientation, &image, monitor)?;
@@ -169,6 +170,7 @@ impl Attempt {
             sensed_rim_mm,
             rim_evidence,
             smoothness_mm: setup.smoothness_mm,
+            noise_length_mm: setup.noise_length_mm,
             readings: self.moved.readings,
             scale: setup.pose.scale(),
             rotation: *setup.pose.rotation(),

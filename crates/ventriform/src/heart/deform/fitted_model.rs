@@ -5,6 +5,7 @@ use super::dynamics::StopReason;
 use super::parameters::WallEdge;
 use super::rim_model::RimEvidence;
 use super::sensors::SensorReading;
+use super::wall_thickness::WallThickness;
 use crate::base::geometry::Vec3;
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::model::wall::VentricleWall;
@@ -32,6 +33,8 @@ pub struct WallSurfaces {
     pub apparent: WallSurface,
     /// The wall itself ([`super::anatomical`]).
     pub anatomical: WallSurface,
+    /// What is known of the thickness of the latter; `None` where a direction has no wall.
+    pub thickness: Option<WallThickness>,
 }
 
 impl WallSurfaces {
@@ -47,7 +50,7 @@ impl WallSurfaces {
         image: &BlurredImage<'_>,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let mesh = anatomical_mesh(&apparent.mesh, &apparent.wall, image);
+        let (mesh, thickness) = anatomical_mesh(&apparent.mesh, &apparent.wall, image);
         let anatomical = WallSurface {
             wall: VentricleWall::new(&mesh, cup, &orientation.superior, monitor)?,
             wall_ml: mesh.volume() / 1000.0,
@@ -56,6 +59,7 @@ impl WallSurfaces {
         Ok(Self {
             apparent,
             anatomical,
+            thickness,
         })
     }
 
@@ -98,6 +102,8 @@ pub struct FittedModel {
     pub rim_evidence: Option<RimEvidence>,
     /// The smoothness of the image about it, mm; ventricles only.
     pub smoothness_mm: Option<f64>,
+    /// The length of the image's noise beside it, mm; ventricles only.
+    pub noise_length_mm: Option<f64>,
     /// The sensors' readings when the motion ended, [`PER_TRIANGLE`](super::sensors::PER_TRIANGLE) of each triangle.
     pub readings: Vec<SensorReading>,
     /// Isotropic scale of the pose against the template.
@@ -150,6 +156,7 @@ impl FittedModel {
             Ok(WallSurfaces {
                 apparent: surface(both.apparent)?,
                 anatomical: surface(both.anatomical)?,
+                thickness: both.thickness,
             })
         };
         Ok(Self {

@@ -13,7 +13,7 @@
 //! 5. [`attempt`]: count folds and self-intersections; if there are any, repeat step 4 with four
 //!    times the stiffness, at most three times.
 //! 6. [`base_plane`]: move the rim of a ventricle where anatomy and image together put it.
-//! 7. [`anatomical`]: the wall itself from the wall as it looks.
+//! 7. [`anatomical`]: the wall itself from the wall as it looks, as thick as [`wall_thickness`] says.
 //!
 //! The edge that is fitted is the half-way point between the wall's ridge and the trough beside
 //! it. It does not depend on uptake: a wall with half the uptake has its edge in the same place.
@@ -41,12 +41,16 @@ pub mod error;
 pub mod fitted_model;
 pub mod organ_position;
 pub mod parameters;
+pub mod protocol_resolution;
 pub mod ray_terms;
+pub mod resolution_terms;
 pub mod rim_frame;
 pub mod rim_model;
 pub mod sensors;
 pub mod setup;
 pub mod signal_end;
+mod thickness_calibration;
+pub mod wall_thickness;
 
 pub use error::DeformError;
 pub use fitted_model::{FittedModel, WallSurface, WallSurfaces};

@@ -7,7 +7,9 @@ use crate::base::geometry::bvh::Aabb;
 use crate::base::progress::{Cancelled, Monitor, Stage};
 use crate::heart::model::Template;
 use crate::image::grid::Volume;
+use crate::image::grid::blur::FWHM_PER_SIGMA;
 use crate::image::grid::field::Field;
+use crate::image::grid::noise_length::noise_length_mm;
 use crate::image::grid::smoothness::smoothness_mm;
 use crate::image::locate;
 use crate::image::locate::body::{self, Blob};
@@ -21,6 +23,15 @@ const SMOOTHNESS_CEILING: f64 = 1.3;
 /// Gaussian blur of that cube, which takes its noise away, sigma in mm.
 const SMOOTHNESS_BLUR_MM: f64 = 5.0;
 
+/// Half the side of the cube about a ventricle's centre whose noise is looked at, mm.
+const NOISE_REACH_MM: f64 = 120.0;
+/// Radius of the sphere about the centre that is left out: the heart itself, mm.
+const NOISE_HEART_RADIUS_MM: f64 = 75.0;
+/// Full width at half maximum of the blur that tells the activity about a voxel, mm.
+const NOISE_ACTIVITY_BLUR_MM: f64 = 20.0;
+/// Least activity of the body, of the wall's.
+const NOISE_BODY_SHARE: f64 = 0.03;
+
 /// The position of an organ in a volume: the same for all templates of the organ.
 #[derive(Debug, Clone)]
 pub enum OrganPosition {
@@ -32,6 +43,8 @@ pub enum OrganPosition {
         orientation: PatientOrientation,
         /// The smoothness of the image about it, mm ([`smoothness`](crate::image::grid::smoothness)).
         smoothness_mm: Option<f64>,
+        /// The length of the image's noise beside it, mm ([`noise_length`](crate::image::grid::noise_length)).
+        noise_length_mm: Option<f64>,
     },
     /// Any other organ.
     Body {
@@ -66,6 +79,7 @@ impl OrganPosition {
                 };
                 OrganPosition::Ventricle {
                     smoothness_mm: smoothness_about(&found, volume, monitor)?,
+                    noise_length_mm: noise_length_beside(&found, volume, monitor)?,
                     found,
                     orientation,
                 }
@@ -97,6 +111,17 @@ impl OrganPosition {
         }
     }
 
+    /// The length of the image's noise beside a ventricle, mm; `None` for other organs, and where too little of the
+    /// body is seen.
+    pub(super) fn noise_length_mm(&self) -> Option<f64> {
+        match self {
+            OrganPosition::Ventricle {
+                noise_length_mm, ..
+            } => *noise_length_mm,
+            OrganPosition::Body { .. } => None,
+        }
+    }
+
     /// The image to fit to, where it is not the volume itself.
     pub(super) fn mask(&self) -> Option<&Volume> {
         match self {
@@ -121,4 +146,32 @@ fn smoothness_about(
     let mut cube = cube.with_values(clipped);
     cube.blur(SMOOTHNESS_BLUR_MM, monitor)?;
     Ok(smoothness_mm(cube.values(), cube.shape(), cube.spacing()))
+}
+
+/// The length of the image's noise in the body beside the ventricle that was found, mm.
+fn noise_length_beside(
+    found: &Localisation,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<f64>, Cancelled> {
+    let reach = Vec3::repeat(NOISE_REACH_MM);
+    let centre = found.cup.centre;
+    let region = Aabb::around(&[centre - reach, centre + reach]);
+    let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let mut activity = cube.clone();
+    activity.blur(NOISE_ACTIVITY_BLUR_MM / FWHM_PER_SIGMA, monitor)?;
+    let least = NOISE_BODY_SHARE * found.wall;
+    let [nx, ny, _] = cube.shape();
+    let counts = |index: usize| {
+        let place = [index % nx, index / nx % ny, index / (nx * ny)].map(|i| i as f64);
+        let place = cube.to_patient(&Vec3::from(place));
+        f64::from(activity.values()[index]) >= least
+            && (place - centre).norm() >= NOISE_HEART_RADIUS_MM
+    };
+    Ok(noise_length_mm(
+        cube.values(),
+        cube.shape(),
+        cube.spacing(),
+        counts,
+    ))
 }

@@ -45,6 +45,8 @@ pub struct FitSetup {
     pub field: Field,
     /// The smoothness of the image about a ventricle, mm; `None` for other organs.
     pub smoothness_mm: Option<f64>,
+    /// The length of the image's noise beside a ventricle, mm; `None` for other organs, and where it cannot be told.
+    pub noise_length_mm: Option<f64>,
     /// Ends of the line that the inner surface faces, LPS mm.
     cavity_axis: [Vec3; 2],
     /// Typical value of the organ.
@@ -112,6 +114,7 @@ impl FitSetup {
             uptake,
             field,
             smoothness_mm: position.smoothness_mm(),
+            noise_length_mm: position.noise_length_mm(),
             blind: None,
         })
     }

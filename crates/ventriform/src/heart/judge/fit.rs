@@ -32,11 +32,18 @@ impl Fit {
             - 0.02 * self.flags_of_fit() as f64
     }
 
-    /// The number of flags but those of what the image lacks: a model that ends short of a dark apex or of a cut does
-    /// not see it, and is no better for that.
+    /// The number of flags but those of what the image lacks or the heart is: a model that ends short of a dark apex or of
+    /// a cut does not see it, and is no better for that.
     fn flags_of_fit(&self) -> usize {
-        let of_image =
-            |flag: &&Flag| matches!(flag, Flag::DarkApex { .. } | Flag::FieldOfView { .. });
+        let of_image = |flag: &&Flag| {
+            matches!(
+                flag,
+                Flag::DarkApex { .. }
+                    | Flag::FieldOfView { .. }
+                    | Flag::ThickWall(_)
+                    | Flag::ThicknessAssumed(_)
+            )
+        };
         let flags = &self.judgement.flags;
         flags.len() - flags.iter().filter(of_image).count()
     }

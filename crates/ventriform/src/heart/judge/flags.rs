@@ -4,6 +4,7 @@ use super::evidence::Evidence;
 use super::exchanged_axes::{AxisPair, Score};
 use super::values::{Background, HotVoxels, Saturation};
 use crate::heart::deform::dynamics::StopReason;
+use crate::heart::deform::wall_thickness::WallThickness;
 
 /// A warning about a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -171,12 +172,37 @@ pub enum Flag {
         /// Greatest plausible value.
         most: f64,
     },
+    /// The wall looks thicker than blur makes usual walls look.
+    #[error(
+        "the wall is thick: {:.1} mm in the mean, between {:.1} and {:.1} mm in nine of ten hearts that look so; usual \
+         walls that look so have {:.1} mm{}", .0.mean_mm, .0.interval_mm[0], .0.interval_mm[1], .0.look.usual_mm,
+        unless_stated(.0)
+    )]
+    ThickWall(WallThickness),
+    /// The image hardly tells the thickness of the wall.
+    #[error(
+        "the image hardly tells how thick the wall is: {:.1} mm is the mean of what is likely, between {:.1} and {:.1} mm \
+         in nine of ten hearts that look so. Volumes of wall and cavity depend on it{}",
+        .0.mean_mm, .0.interval_mm[0], .0.interval_mm[1], unless_stated(.0)
+    )]
+    ThicknessAssumed(WallThickness),
     /// The rim is far from a plane, so volumes depend on where the base is taken to be.
     #[error("the valve plane is unclear: {:.0} % of the basal half has no wall", 100.0 * gaps)]
     ValvePlane {
         /// Share of basal rays without wall.
         gaps: f64,
     },
+}
+
+/// What to do about a thickness that is not well known.
+fn unless_stated(thickness: &WallThickness) -> &'static str {
+    match thickness.look.resolution_mm {
+        Some(_) => "",
+        None => {
+            ". A camera that blurs more than usual makes walls look thicker too: state its resolution (resolution), if it \
+             is known"
+        }
+    }
 }
 
 /// The part of an apical wall that takes up too little to be seen.
@@ -329,6 +355,8 @@ impl Flag {
             Flag::FieldOfView { .. } => "field_of_view",
             Flag::TouchesBorder { .. } => "touches_border",
             Flag::ImplausibleShape { .. } => "implausible_shape",
+            Flag::ThickWall(_) => "thick_wall",
+            Flag::ThicknessAssumed(_) => "thickness_assumed",
             Flag::ValvePlane { .. } => "valve_plane",
         }
     }

@@ -116,7 +116,8 @@ pub fn judge(
         .zip(evidence.as_ref())
         .map(|(both, evidence)| {
             let anatomical = &both.anatomical;
-            VolumeIntervals::about(anatomical.wall_ml, anatomical.wall.cavity_ml, evidence.dark)
+            let (wall, thickness) = (&anatomical.wall, both.thickness.as_ref());
+            VolumeIntervals::about(anatomical.wall_ml, wall.cavity_ml, evidence.dark, thickness)
         });
     Ok(Judgement {
         confidence,

@@ -6,16 +6,18 @@ use crate::base::numeric::error_terms::ErrorTerms;
 
 /// Error of the volume of the anatomical wall, as a share of it.
 pub(super) const WALL_ERROR: ErrorTerms = ErrorTerms {
-    bias: -0.016,
-    usual: 0.091,
-    dark: 0.303,
-    small: 0.006,
+    bias: -0.02,
+    usual: 0.0,
+    dark: 0.0,
+    small: 0.108,
+    thickness: 1.003,
 };
 
 /// Error of the volume of its cavity, as a share of it.
 pub(super) const CAVITY_ERROR: ErrorTerms = ErrorTerms {
-    bias: -0.003,
-    usual: 0.06,
-    dark: 0.373,
-    small: 0.078,
+    bias: 0.032,
+    usual: 0.0,
+    dark: 0.0,
+    small: 0.0,
+    thickness: 0.581,
 };

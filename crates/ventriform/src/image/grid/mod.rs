@@ -6,7 +6,7 @@
 //! - [`mod@blur`]: separable Gaussian blur;
 //! - [`field`]: a blurred volume as a smooth function of position;
 //! - [`size`]: whether the field is that of a scan of a chest;
-//! - [`smoothness`]: the length over which an image's values change;
+//! - [`smoothness`], [`noise_length`]: the lengths over which an image's values and its noise change;
 //! - [`labels`], [`components`]: sets of voxels, their topology and connected parts;
 //! - [`voxelise`]: from a closed mesh to the mask of the voxels inside it;
 //! - [`gates`]: how many volumes, and how alike in place, are the gates of one study;
@@ -19,6 +19,7 @@ pub mod components;
 pub mod field;
 pub mod gates;
 pub mod labels;
+pub mod noise_length;
 pub mod size;
 pub mod smoothness;
 pub mod survey;
