@@ -550,6 +550,9 @@ class Fit(Document):
     """Size relative to the model."""
     self_intersections: int
     """Intersecting pairs of triangles."""
+    size_confidence: float | None = None
+    """Chance that the true cavity is within 20 % of the anatomical one, calibrated on simulated scans, 0 to 1: how
+    sure the *size* is, where `confidence` says how sure the *place* of the visible edge is; ventricles only."""
     strain: float
     """Root of the mean squared strain."""
     turned_triangles: int
@@ -1689,6 +1692,8 @@ class SegmentationReport(Document):
     """Which voxels the mask holds."""
     mass_g: float | None = None
     """Mass of the myocardium, g, from the anatomical wall; ventricles only."""
+    mass_interval_g: list[float] | None = None
+    """Of nine of ten hearts, the true mass lies within these, g; ventricles only."""
     measures: Agreement | None = None
     """Agreement with the expert's mask."""
     parameters: dict[str, Any]
@@ -1955,6 +1960,8 @@ class Thicknesses(Document):
 
     anatomical: Thickness
     """Of the wall corrected for the blur."""
+    anatomical_interval: list[float] | None = None
+    """Of nine of ten hearts that look so, the true mean thickness lies within these."""
     apparent: Thickness
     """Of the wall as the blurred image shows it."""
 

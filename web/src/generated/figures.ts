@@ -796,6 +796,7 @@ export const FIGURES = {
       "about": "Mass of the anatomical wall's muscle, at 1.05 g/ml.",
       "unit": "g",
       "digits": 0,
+      "interval": "mass_interval_g",
       "headline": true,
       "code": "118538004, SCT"
     },
@@ -805,6 +806,7 @@ export const FIGURES = {
       "about": "Mean thickness of the anatomical wall.",
       "unit": "mm",
       "digits": 1,
+      "interval": "thickness_mm/anatomical_interval",
       "headline": true,
       "code": "122445, DCM"
     },

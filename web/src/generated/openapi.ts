@@ -352,7 +352,7 @@ export interface components {
              * @default 10
              */
             reach?: number;
-            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
              * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
@@ -977,7 +977,7 @@ export interface components {
              * @default 10
              */
             reach?: number;
-            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /** @description Id of the volume with the scan at rest */
             rest?: string;
@@ -1762,6 +1762,12 @@ export interface components {
              * @description Intersecting pairs of triangles.
              */
             self_intersections: number;
+            /**
+             * Format: double
+             * @description Chance that the true cavity is within 20 % of the anatomical one, calibrated on simulated scans, 0 to 1: how sure the
+             *     *size* is, where `confidence` says how sure the *place* of the visible edge is; ventricles only.
+             */
+            size_confidence?: number | null;
             /**
              * Format: double
              * @description Root of the mean squared strain.
@@ -3193,7 +3199,7 @@ export interface components {
              * @default 10
              */
             reach?: number;
-            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
              * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
@@ -3381,7 +3387,7 @@ export interface components {
              * @default 10
              */
             reach?: number;
-            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
              * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
@@ -4636,7 +4642,7 @@ export interface components {
              * @default false
              */
             resample?: boolean;
-            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
              * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
@@ -4717,6 +4723,8 @@ export interface components {
              * @description Mass of the myocardium, g, from the anatomical wall; ventricles only.
              */
             mass_g?: number | null;
+            /** @description Of nine of ten hearts, the true mass lies within these, g; ventricles only. */
+            mass_interval_g?: number[] | null;
             measures?: components["schemas"]["Agreement"] | null;
             /** @description Every parameter, defaults written out. */
             parameters: components["schemas"]["SegmentationParameters"];
@@ -5283,6 +5291,8 @@ export interface components {
         Thicknesses: {
             /** @description Of the wall corrected for the blur. */
             anatomical: components["schemas"]["Thickness"];
+            /** @description Of nine of ten hearts that look so, the true mean thickness lies within these. */
+            anatomical_interval?: number[] | null;
             /** @description Of the wall as the blurred image shows it. */
             apparent: components["schemas"]["Thickness"];
         };

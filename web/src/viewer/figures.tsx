@@ -56,12 +56,20 @@ const EVIDENCE: [string, (evidence: Evidence) => string][] = [
   ["Chance that the patient moved", evidence => share(evidence.chance_of_motion)],
 ];
 
+/** How sure something is, as a bar. */
+function Chance({ of, value }: { of: string; value: number }) {
+  return (
+    <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={value} aria-label={`Confidence of the ${of}`} />
+  );
+}
+
 /**
  * Whether the fit is good, in words; every reason to doubt it; and the figures behind both, which are `open` on paper.
  */
 export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean }) {
   const flags = shown.report?.flags ?? shown.beat?.report.flags ?? [];
   const confidence = shown.report?.fit.confidence ?? shown.beat?.report.confidence;
+  const ofSize = shown.report?.fit.size_confidence;
   const evidence = shown.report?.evidence;
   const heart = shown.report?.template ?? shown.beat?.report.template;
   const known = typeof confidence === "number";
@@ -89,12 +97,19 @@ export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean
         <details open={open}>
           <summary>Figures behind it</summary>
           <p>
-            Of fits judged like this one{shown.beat && ", to the sum of the gates"},{" "}
+            <b>Place:</b> of fits judged like this one{shown.beat && ", to the sum of the gates"},{" "}
             {confidence > 0.99 ? "more than 99" : (100 * confidence).toFixed(0)} in 100 agree with a reader who draws
             the visible edge (Jaccard index 0.75 or more). Calibrated on simulated scans: a reader who draws farther out
             agrees less.
-            <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
+            <Chance of="place" value={confidence} />
           </p>
+          {typeof ofSize === "number" && (
+            <p>
+              <b>Size:</b> of hearts that look like this one, {(100 * ofSize).toFixed(0)} in 100 have a cavity within 20
+              % of the one found.
+              <Chance of="size" value={ofSize} />
+            </p>
+          )}
           {evidence && (
             <table>
               <tbody>

@@ -67,6 +67,7 @@ pub const FIGURES: &[Figure] = &[
         0,
         "Mass of the anatomical wall's muscle, at 1.05 g/ml.",
     )
+    .within("mass_interval_g")
     .coded(Group::Whole, sct("118538004", "Mass")),
     figure(
         "thickness_mm/anatomical/mean",
@@ -75,6 +76,7 @@ pub const FIGURES: &[Figure] = &[
         1,
         "Mean thickness of the anatomical wall.",
     )
+    .within("thickness_mm/anatomical_interval")
     .coded_mean(Group::AnatomicalWall, WALL_THICKNESS),
     figure(
         "wall_thickness_mm",

@@ -55,6 +55,10 @@ pub struct FitReport {
     /// Chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of 0.75 or more, calibrated on
     /// simulated scans, 0 to 1; of other organs, half the share of the surface that sees an edge.
     pub confidence: f64,
+    /// Chance that the true cavity is within 20 % of the anatomical one, calibrated on simulated scans, 0 to 1: how sure the
+    /// *size* is, where `confidence` says how sure the *place* of the visible edge is; ventricles only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub size_confidence: Option<f64>,
     /// Steps of the motion.
     pub iterations: usize,
     /// Runs from different starts.
@@ -142,6 +146,9 @@ pub struct Thicknesses {
     pub apparent: Thickness,
     /// Of the wall corrected for the blur.
     pub anatomical: Thickness,
+    /// Of nine of ten hearts that look so, the true mean thickness lies within these.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anatomical_interval: Option<[f64; 2]>,
 }
 
 /// Thickness of a wall, mm.
@@ -253,6 +260,7 @@ impl FitReport {
         Self {
             reason: fit.reason.as_str().to_owned(),
             confidence: round(judgement.confidence),
+            size_confidence: (judgement.volumes).map(|volumes| round(volumes.size_confidence)),
             iterations: fit.iterations,
             runs: fit.runs,
             residual_mm: round(fit.residual),
@@ -323,6 +331,7 @@ impl Thicknesses {
         Some(Self {
             apparent: of(&both.apparent.wall),
             anatomical: of(&both.anatomical.wall),
+            anatomical_interval: (both.thickness).map(|thickness| thickness.interval_mm.map(round)),
         })
     }
 }

@@ -186,6 +186,17 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
                 ),
             ),
             (
+                "thick_wall",
+                "The wall looks no thicker than usual walls do".to_owned(),
+            ),
+            (
+                "thickness_assumed",
+                format!(
+                    "Chance that the true cavity is within 20 % of the one found: {} %",
+                    percent(fit.size_confidence.unwrap_or(f64::NAN))
+                ),
+            ),
+            (
                 "motion",
                 "The wall is neither doubled nor displaced as by motion".to_owned(),
             ),

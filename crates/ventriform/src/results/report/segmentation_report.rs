@@ -44,6 +44,9 @@ pub struct SegmentationReport {
     pub volumes_ml: FittedVolumes,
     /// Mass of the myocardium, g, from the anatomical wall; ventricles only.
     pub mass_g: Option<f64>,
+    /// Of nine of ten hearts, the true mass lies within these, g; ventricles only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass_interval_g: Option<[f64; 2]>,
     /// Mean thickness of the wall that `edge` asks for; ventricles only.
     pub wall_thickness_mm: Option<f64>,
     /// Thickness of both walls; ventricles only.
@@ -217,6 +220,10 @@ impl SegmentationReport {
             volumes_ml: FittedVolumes::new(fit, judgement),
             mass_g: anatomical
                 .map(|surface| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
+            mass_interval_g: (judgement.volumes).map(|intervals| {
+                let grams = |wall_ml: f64| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * wall_ml);
+                intervals.wall_ml.map(grams)
+            }),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),
             thickness_mm: Thicknesses::from_fit(fit),
             uncertainty_mm: Uncertainties::from_judgement(judgement),

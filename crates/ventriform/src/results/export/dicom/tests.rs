@@ -683,6 +683,7 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     scene.report.thickness_mm = Some(Thicknesses {
         apparent: thickness(f64::NAN),
         anatomical: thickness(9.5),
+        anatomical_interval: Some([7.5, 13.25]),
     });
     let set = scene.read(DicomObject::Measurements);
     let part = |method: &str, site: &str, number| (method.to_owned(), site.to_owned(), number);
@@ -700,10 +701,10 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     assert_eq!(all.len(), 4 + 2 + 3 + 2 * 17);
     let mut found = Vec::new();
     ranges(&set, &mut found);
-    assert_eq!(found, [10.75, 19.0, 7.25, 6.25]);
+    assert_eq!(found, [10.75, 19.0, 2.0, 3.75, 7.25, 6.25]);
 }
 
-/// The distance that the truth may lie below and above, ml, for each figure that states it.
+/// The distance that the truth may lie below and above, ml or mm, for each figure that states it.
 fn ranges(set: &InMemDicomObject, into: &mut Vec<f64>) {
     for child in set
         .get(tags::CONTENT_SEQUENCE)
