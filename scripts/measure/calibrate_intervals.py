@@ -7,10 +7,10 @@
                                                  writes them
 
 The tables are what the programs `beats` and `volumes` print; calibrate_all.py makes them. beats.csv of
-scripts/measure/calibration, for crates/ventriform/src/heart/beat/calibration.rs, has 56 gated studies, of the sets BEATS and
-BEATS_OF_THICKNESS of calibrate_all.py; volumes.csv, for
-crates/ventriform/src/heart/judge/volume_calibration.rs, the 282 hearts of the sets OF_VOLUMES and OF_THICKNESS of
-calibrate_all.py. One table after the other:
+scripts/measure/calibration, for crates/ventriform/src/heart/beat/calibration.rs, has 56 gated studies, of the sets
+BEATS and BEATS_OF_THICKNESS of calibrate_all.py; volumes.csv, for
+crates/ventriform/src/heart/judge/volume_calibration.rs, the 283 hearts of its sets OF_VOLUMES and OF_THICKNESS. One
+table after the other:
 
     cargo run --release -p ventriform-evaluation --bin simulate -- gated --out CASES --seed 500 --n 20
     cargo run --release -p ventriform-evaluation --bin beats -- CASES/* > TABLE
@@ -101,10 +101,7 @@ def estimate(sets, error, causes):
 
     scale = error.std()
     starts = [
-        (error.mean(), scale * a, scale * b, scale * c, 0.5)
-        for a in (0.5, 1)
-        for b in (0.5, 3)
-        for c in (0.3, 1)
+        (error.mean(), scale * a, scale * b, scale * c, 0.5) for a in (0.5, 1) for b in (0.5, 3) for c in (0.3, 1)
     ]
     found = min(
         (minimize(cost, s, method="Nelder-Mead", options=dict(maxiter=4000, xatol=1e-6, fatol=1e-6)) for s in starts),

@@ -8,7 +8,8 @@
 //! edv_ml, esv_ml, ef, and segments with motion_mm, thickening_percent and contraction (below .25: akinetic). Prints
 //! a row for each study that has a fit, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and
 //! deviation of motion and thickening (also by counts) over all segments, and how well thickening finds the akinetic
-//! ones. PRIOR names a field of [`Priors`], or `resolution_more_mm`.
+//! ones. PRIOR names a field of [`Priors`], or `resolution_more_mm`. With mean_thickness_mm, the thickness that the summed
+//! image tells is not used.
 
 use anyhow::{Result, anyhow, bail};
 use serde_json::Value;
@@ -28,19 +29,25 @@ const RIGHT_EF_POINTS: f64 = 5.0;
 fn main() -> Result<()> {
     let mut parameters = BeatParameters::default();
     let mut resolution_more_mm = 0.0;
+    let mut assumed = false;
     let mut studies = Vec::new();
     for argument in std::env::args().skip(1) {
         match argument.split_once('=') {
             Some(("resolution_more_mm", value)) => resolution_more_mm = value.parse()?,
-            Some((name, value)) => set(&mut parameters.priors, name, value.parse()?)?,
+            Some((name, value)) => {
+                assumed |= name == "mean_thickness_mm";
+                set(&mut parameters.priors, name, value.parse()?)?;
+            }
             None => studies.push(argument),
         }
     }
-    println!("study,ef,true_ef,edv,true_edv,esv,true_esv,wall,steps,orders_as_smooth,dark,flags");
+    println!(
+        "set,study,ef,true_ef,edv,true_edv,esv,true_esv,wall,thickness_share,steps,orders_as_smooth,dark,flags"
+    );
     let mut table = Table::default();
     for study in &studies {
         let folder = Path::new(study);
-        match one(folder, &parameters, resolution_more_mm) {
+        match one(folder, &parameters, resolution_more_mm, assumed) {
             Ok(row) => table.add(folder, &row),
             Err(error) => eprintln!("{study} is left out: {error:#}"),
         }
@@ -76,7 +83,12 @@ struct Row {
     truth: Value,
 }
 
-fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> Result<Row> {
+fn one(
+    folder: &Path,
+    parameters: &BeatParameters,
+    resolution_more_mm: f64,
+    assumed: bool,
+) -> Result<Row> {
     let quiet = Monitor::silent();
     let file = VolumeFile::at(folder.join("gated.nii.gz"));
     let reading = read_gates(&[file], true, &ReadLimits::default(), &quiet)?;
@@ -97,7 +109,12 @@ fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> R
         bail!("no ventricle");
     };
     let width = resolution.value + resolution_more_mm;
-    let fitted = beat::fit(&study, &surfaces.anatomical.wall, width, parameters, &quiet)?;
+    let parameters = BeatParameters {
+        thickness: surfaces.thickness.filter(|_| !assumed),
+        ..parameters.clone()
+    };
+    let wall = &surfaces.anatomical.wall;
+    let fitted = beat::fit(&study, wall, width, &parameters, &quiet)?;
     let text = std::fs::read(folder.join("params.json"))?;
     Ok(Row {
         beat: Beat::new(fitted, &study, map, None),
@@ -130,7 +147,8 @@ impl Table {
         let ef = 100.0 * (1.0 - beat.end_systole.cavity_ml / beat.end_diastole.cavity_ml);
         let flags: Vec<&str> = beat.flags.iter().map(|flag| flag.code()).collect();
         println!(
-            "{},{ef:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{},{:.4},{:.2},{}",
+            "{},{},{ef:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.4},{},{:.4},{:.2},{}",
+            set_of(folder),
             folder.file_name().unwrap_or_default().display(),
             100.0 * number("ef"),
             beat.end_diastole.cavity_ml,
@@ -138,6 +156,7 @@ impl Table {
             beat.end_systole.cavity_ml,
             number("esv_ml"),
             beat.curve[0].wall_ml,
+            beat.fit.thickness_share,
             beat.fit.steps,
             beat.fit.orders_as_smooth,
             beat.fit.dark_share(),
@@ -213,6 +232,12 @@ impl Table {
             self.within.len()
         );
     }
+}
+
+/// The name of the folder that a study lies in.
+fn set_of(study: &Path) -> std::path::Display<'_> {
+    let set = study.parent().and_then(Path::file_name);
+    Path::new(set.unwrap_or_default()).display()
 }
 
 /// Mean, deviation and largest size.

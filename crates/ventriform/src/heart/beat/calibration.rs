@@ -6,24 +6,27 @@ use crate::base::numeric::error_terms::ErrorTerms;
 
 /// Error of the ejection fraction, points.
 pub(super) const EF_ERROR: ErrorTerms = ErrorTerms {
-    bias: 0.496,
-    usual: 1.262,
-    dark: 23.441,
-    small: 6.357,
+    bias: 0.965,
+    usual: 3.34,
+    dark: 59.016,
+    small: 0.0,
+    thickness: 0.139,
 };
 
 /// Error of the end-diastolic volume, as a share of it.
 pub(super) const EDV_ERROR: ErrorTerms = ErrorTerms {
-    bias: -0.025,
-    usual: 0.024,
-    dark: 0.225,
-    small: 0.104,
+    bias: -0.021,
+    usual: 0.0,
+    dark: 0.0,
+    small: 0.0,
+    thickness: 0.439,
 };
 
 /// Error of the end-systolic volume, as a share of it.
 pub(super) const ESV_ERROR: ErrorTerms = ErrorTerms {
-    bias: -0.026,
-    usual: 0.007,
+    bias: -0.033,
+    usual: 0.0,
     dark: 0.0,
-    small: 0.197,
+    small: 0.0,
+    thickness: 0.4,
 };

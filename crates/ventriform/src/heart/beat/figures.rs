@@ -8,7 +8,7 @@ use super::beside;
 use super::counts::WallCounts;
 use super::fit::{BeatFit, Volumes};
 use super::flags::{self, BeatFlag, FlagFacts};
-use super::intervals::Intervals;
+use super::intervals::{Intervals, WallCauses};
 use super::moment::{Contraction, WallMoment, area_vectors};
 use super::phase::{Phases, circular_mean};
 use super::study::GatedStudy;
@@ -130,8 +130,12 @@ impl Beat {
             },
             factors: study.factors.clone(),
             intervals: (!denied).then(|| {
-                let dark = fit.dark_share();
-                Intervals::about(end_diastole.cavity_ml, end_systole.cavity_ml, dark)
+                let wall = WallCauses {
+                    wall_ml: mean_wall_ml(&curve),
+                    dark_share: fit.dark_share(),
+                    thickness_share: fit.thickness_share,
+                };
+                Intervals::about(end_diastole.cavity_ml, end_systole.cavity_ml, &wall)
             }),
             ef_percent: (!denied).then_some(ejected),
             fit,
@@ -155,8 +159,7 @@ impl Beat {
 
     /// Muscle of the wall in the mean of the curve, ml.
     pub fn mean_wall_ml(&self) -> f64 {
-        let walls = self.curve.iter().map(|volumes| volumes.wall_ml);
-        walls.sum::<f64>() / self.curve.len() as f64
+        mean_wall_ml(&self.curve)
     }
 
     /// Whether the gates are a beat, and enough of the wall moves, more than noise does, to have phases.
@@ -164,6 +167,10 @@ impl Beat {
         let unreliable = |flag: &BeatFlag| matches!(flag, BeatFlag::PhaseUnreliable { .. });
         self.ef_percent.is_some() && !self.flags.iter().any(unreliable)
     }
+}
+
+fn mean_wall_ml(curve: &[Volumes]) -> f64 {
+    curve.iter().map(|volumes| volumes.wall_ml).sum::<f64>() / curve.len() as f64
 }
 
 fn extreme(curve: &[Volumes], gates: &[Volumes], beyond: impl Fn(f64, f64) -> bool) -> Extreme {

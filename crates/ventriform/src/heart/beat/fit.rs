@@ -1,13 +1,13 @@
 //! The fit of one wall to all gates.
 //!
-//! In: a [`GatedStudy`], the anatomical wall of its summed image, the image's resolution. Out: a [`BeatFit`]: the wall
+//! In: a [`GatedStudy`], the anatomical wall of its summed image with its thickness, the image's resolution. Out: a [`BeatFit`]: the wall
 //! at every moment of the beat. The steps:
 //!
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis, and turned so that the one with the
 //!    least energy about the wall is the first: the steps, which end before the value is at rest, are then the same
 //!    wherever in the cycle the study begins.
 //! 2. The motion has two harmonics where the gates are noisy, else three or four ([`spectrum`](super::spectrum)).
-//! 3. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
+//! 3. The fit starts from the summed image's wall, which stands still, as thick in the mean as is known.
 //! 4. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
 //!    stretch, activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which
 //!    the motion is a fifth too small after 60 steps, though the value has fallen by 95 per cent. It ends when EF is
@@ -36,6 +36,7 @@ use super::study::GatedStudy;
 use crate::base::geometry::Vec3;
 use crate::base::numeric::lbfgs;
 use crate::base::progress::{Cancelled, Monitor, Stage};
+use crate::heart::deform::wall_thickness::WallThickness;
 use crate::heart::model::wall::VentricleWall;
 use crate::image::grid::Volume;
 use crate::image::grid::field::Field;
@@ -66,11 +67,13 @@ const CURVE_MOMENTS: usize = 48;
 pub struct BeatParameters {
     /// Weights of what is known of walls.
     pub priors: Priors,
+    /// Thickness of the wall, as far as the summed image tells it. Default: the mean thickness of [`Priors`].
+    pub thickness: Option<WallThickness>,
     /// Harmonics of the motion; `None`: 3, 4 from 16 gates on, 2 where the gates are noisy or fewer than 8.
     pub harmonics: Option<usize>,
     /// Most steps, 1..=2000. Default 400.
     pub max_steps: usize,
-    /// Volume of the muscle, ml, where it is known. Default: the mean thickness of [`Priors`] is assumed.
+    /// Volume of the muscle, ml, where it is known. Default: it follows from the thickness.
     pub muscle_ml: Option<f64>,
 }
 
@@ -78,6 +81,7 @@ impl Default for BeatParameters {
     fn default() -> Self {
         Self {
             priors: Priors::default(),
+            thickness: None,
             harmonics: None,
             max_steps: 400,
             muscle_ml: None,
@@ -100,6 +104,8 @@ pub struct BeatFit {
     pub share_outside: f64,
     /// The scatter of the wall's phases by noise alone, degrees ([`noise`]).
     pub phase_noise_degrees: f64,
+    /// Standard deviation of the wall's mean thickness over the thickness; 0 where it was stated or is not known.
+    pub thickness_share: f64,
     /// Steps made.
     pub steps: usize,
 }
@@ -173,11 +179,11 @@ pub fn fit(
         .map(|counted| f64::from(u8::from(*counted)))
         .collect();
     gate_weights.rotate_left(first_gate);
-    let priors = &parameters.priors;
+    let priors = parameters.priors.of_wall(parameters.thickness.as_ref());
     let relative: Vec<f64> = (still.peaks.iter())
         .map(|peak| peak / (scale * count as f64))
         .collect();
-    let start = start_of(&layout, &still, &relative, resolution_mm, priors);
+    let start = start_of(&layout, &still, &relative, resolution_mm, &priors);
     let observed = Observed {
         images,
         gate_weights,
@@ -188,14 +194,7 @@ pub fn fit(
     };
     let orders_as_smooth = share_as_smooth(&observed.images, &observed.weights);
     let share_outside = share_outside(&study.sum, &grid.points, &observed.weights);
-    let objective = Objective::new(
-        layout,
-        coordinates,
-        grid,
-        resolution_mm,
-        observed,
-        priors.clone(),
-    );
+    let objective = Objective::new(layout, coordinates, grid, resolution_mm, observed, priors);
     let mut made = minimise(
         objective,
         start,
@@ -234,6 +233,10 @@ pub fn fit(
     let phase_noise_degrees = curvature.map_or(0.0, |curvature| {
         noise::phase_noise_degrees(&objective, &unknowns, &curvature)
     });
+    let thickness_share = match (parameters.muscle_ml, &parameters.thickness) {
+        (None, Some(thickness)) => thickness.sd_mm / thickness.mean_mm,
+        _ => 0.0,
+    };
     Ok(BeatFit {
         objective,
         unknowns,
@@ -243,6 +246,7 @@ pub fn fit(
         first_gate,
         orders_as_smooth,
         share_outside,
+        thickness_share,
         steps,
     })
 }

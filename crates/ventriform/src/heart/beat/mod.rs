@@ -45,7 +45,7 @@ pub use error::BeatError;
 pub use figures::{Beat, Extreme, Rates, SegmentMotion};
 pub use fit::{BeatFit, BeatParameters, Volumes, fit};
 pub use flags::BeatFlag;
-pub use intervals::Intervals;
+pub use intervals::{Intervals, WallCauses};
 pub use moment::{Contraction, WallMoment};
 pub use objective::Priors;
 pub use phase::Phases;

@@ -12,6 +12,7 @@ use std::ops::Range;
 use super::fields::{COLUMNS, Conservation, Layout, ROW_SPACING_MM, StateGradient, WallState};
 use super::image::{Activity, ActivityGradient, Blur, HeartGrid, Sample};
 use crate::base::progress::{Cancelled, Monitor};
+use crate::heart::deform::wall_thickness::WallThickness;
 use crate::heart::model::wall::RayCoordinates;
 use crate::image::grid::blur::FWHM_PER_SIGMA;
 use rayon::prelude::*;
@@ -33,7 +34,7 @@ pub struct Priors {
     pub uptake: f64,
     /// Of the logarithm of the activity outside of the wall.
     pub outside: f64,
-    /// Mean thickness of the wall over beat and wall, mm: the image does not tell it.
+    /// Mean thickness of the wall over beat and wall, mm: the gates do not tell it.
     pub mean_thickness_mm: f64,
     /// Its standard deviation, mm.
     pub mean_thickness_sd_mm: f64,
@@ -67,6 +68,17 @@ impl Default for Priors {
             gain: 2e3,
             stretch: 30.0,
             still: 0.05,
+        }
+    }
+}
+
+impl Priors {
+    /// These, about a wall whose thickness is known so far.
+    pub(super) fn of_wall(&self, thickness: Option<&WallThickness>) -> Self {
+        let mean_thickness_mm = thickness.map_or(self.mean_thickness_mm, |wall| wall.mean_mm);
+        Self {
+            mean_thickness_mm,
+            ..self.clone()
         }
     }
 }

@@ -87,6 +87,7 @@ pub fn from_files(
     };
     let density = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML;
     let beat_parameters = BeatParameters {
+        thickness: surfaces.thickness,
         muscle_ml: order.choice.mass_g.map(|mass| mass / density),
         ..BeatParameters::default()
     };
