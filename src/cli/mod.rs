@@ -26,6 +26,7 @@ mod normals;
 mod output;
 mod parameter_args;
 mod phantom;
+mod resolution;
 mod segment;
 mod serve;
 mod statistics;
@@ -71,6 +72,7 @@ enum Command {
     Evaluate(Box<evaluate::EvaluateArgs>),
     Templates(templates::TemplatesArgs),
     Normals(normals::NormalsArgs),
+    Resolution(Box<resolution::ResolutionArgs>),
     Statistics(statistics::StatisticsArgs),
     Serve(Box<serve::ServeArgs>),
     Keys(keys::KeysArgs),
@@ -123,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Templates(args) => templates::run(&args),
         Command::Normals(args) => normals::run(&args),
+        Command::Resolution(args) => resolution::run(&args),
         Command::Statistics(args) => statistics::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),

@@ -539,8 +539,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         groups::IMAGE,
         "mm",
         "Resolution of the image, if it is known: full width at half maximum of a point, including \
-         motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes \
-         a wall look thicker. Default: by calibration on simulated hearts"
+         motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how \
+         much of a wall's thickness is blur. Default: by the image's noise, less certain"
     ),
     choice!(
         "orbit",

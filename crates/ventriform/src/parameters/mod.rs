@@ -18,6 +18,7 @@ mod input;
 mod kind;
 mod model;
 mod normals;
+mod resolution;
 #[cfg(feature = "schema")]
 mod schema;
 mod specs;
@@ -33,6 +34,7 @@ pub use input::RawValue;
 pub use kind::Kind;
 pub use model::ModelParameters;
 pub use normals::{CohortCase, NORMALS_SPECS, NormalsChoice, NormalsParameters};
+pub use resolution::{ResolutionChoice, ResolutionParameters};
 #[cfg(feature = "schema")]
 pub use schema::schema_of;
 pub use specs::MODEL_SPECS;

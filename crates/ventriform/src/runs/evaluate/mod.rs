@@ -16,7 +16,7 @@
 //! 6. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!
 //! [`normals`] stands beside this: limits from scans of healthy people. [`statistics`], too: mean shape and principal
-//! modes of fits of one model.
+//! modes of fits of one model. And [`protocol_resolution`](mod@protocol_resolution): how much a camera blurs.
 //!
 //! Guaranteed: the same cohort, parameters and program give the same bytes, on any number of
 //! threads and however often the run was stopped.
@@ -36,6 +36,7 @@ pub mod observer;
 pub mod paired;
 pub mod parameters;
 pub mod pictures;
+pub mod protocol_resolution;
 pub mod record;
 pub mod rows;
 pub mod sample;
