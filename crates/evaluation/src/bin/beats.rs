@@ -19,7 +19,7 @@ use ventriform::heart::beat::{self, Beat, BeatParameters, GatedStudy, Priors};
 use ventriform::image::volume::{ReadLimits, VolumeFile, read_gates};
 use ventriform::parameters::FitParameters;
 use ventriform::runs::segmentation::{SegmentationParameters, built_in, segment};
-use ventriform_evaluation::statistics;
+use ventriform_evaluation::{name_of, statistics};
 
 /// Contraction of a segment, as a share of a whole one's, below which it counts as akinetic.
 const AKINETIC_CONTRACTION: f64 = 0.25;
@@ -148,8 +148,8 @@ impl Table {
         let flags: Vec<&str> = beat.flags.iter().map(|flag| flag.code()).collect();
         println!(
             "{},{},{ef:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.4},{},{:.4},{:.2},{}",
-            set_of(folder),
-            folder.file_name().unwrap_or_default().display(),
+            folder.parent().map(name_of).unwrap_or_default(),
+            name_of(folder),
             100.0 * number("ef"),
             beat.end_diastole.cavity_ml,
             number("edv_ml"),
@@ -232,12 +232,6 @@ impl Table {
             self.within.len()
         );
     }
-}
-
-/// The name of the folder that a study lies in.
-fn set_of(study: &Path) -> std::path::Display<'_> {
-    let set = study.parent().and_then(Path::file_name);
-    Path::new(set.unwrap_or_default()).display()
 }
 
 /// Mean, deviation and largest size.

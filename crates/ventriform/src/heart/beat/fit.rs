@@ -1,7 +1,7 @@
 //! The fit of one wall to all gates.
 //!
-//! In: a [`GatedStudy`], the anatomical wall of its summed image with its thickness, the image's resolution. Out: a [`BeatFit`]: the wall
-//! at every moment of the beat. The steps:
+//! In: a [`GatedStudy`], the anatomical wall of its summed image with its thickness, the image's resolution. Out: a
+//! [`BeatFit`]: the wall at every moment of the beat. The steps:
 //!
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis, and turned so that the one with the
 //!    least energy about the wall is the first: the steps, which end before the value is at rest, are then the same
@@ -234,7 +234,7 @@ pub fn fit(
         noise::phase_noise_degrees(&objective, &unknowns, &curvature)
     });
     let thickness_share = match (parameters.muscle_ml, &parameters.thickness) {
-        (None, Some(thickness)) => thickness.sd_mm / thickness.mean_mm,
+        (None, Some(thickness)) => thickness.sd_share(),
         _ => 0.0,
     };
     Ok(BeatFit {

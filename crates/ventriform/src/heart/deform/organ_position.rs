@@ -131,15 +131,25 @@ impl OrganPosition {
     }
 }
 
+/// The image in a cube of twice `reach_mm` about `centre`.
+fn cube_about(
+    centre: &Vec3,
+    reach_mm: f64,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Field, Cancelled> {
+    let reach = Vec3::repeat(reach_mm);
+    let region = Aabb::around(&[centre - reach, centre + reach]);
+    Field::cut_out(volume, Some(&region), 0.0, monitor)
+}
+
 /// The smoothness of the image about the ventricle that was found, mm.
 fn smoothness_about(
     found: &Localisation,
     volume: &Volume,
     monitor: &Monitor,
 ) -> Result<Option<f64>, Cancelled> {
-    let reach = Vec3::repeat(SMOOTHNESS_REACH_MM);
-    let region = Aabb::around(&[found.cup.centre - reach, found.cup.centre + reach]);
-    let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let cube = cube_about(&found.cup.centre, SMOOTHNESS_REACH_MM, volume, monitor)?;
     let ceiling = (SMOOTHNESS_CEILING * found.wall) as f32;
     let clipped = cube.values().iter().map(|value| value.min(ceiling));
     let clipped = clipped.collect();
@@ -154,10 +164,8 @@ fn noise_length_beside(
     volume: &Volume,
     monitor: &Monitor,
 ) -> Result<Option<f64>, Cancelled> {
-    let reach = Vec3::repeat(NOISE_REACH_MM);
     let centre = found.cup.centre;
-    let region = Aabb::around(&[centre - reach, centre + reach]);
-    let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let cube = cube_about(&centre, NOISE_REACH_MM, volume, monitor)?;
     let mut activity = cube.clone();
     activity.blur(NOISE_ACTIVITY_BLUR_MM / FWHM_PER_SIGMA, monitor)?;
     let least = NOISE_BODY_SHARE * found.wall;

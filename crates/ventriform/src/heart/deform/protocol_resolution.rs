@@ -18,7 +18,7 @@
 
 use super::resolution_terms::ResolutionTerms;
 use super::thickness_calibration::RESOLUTION;
-use super::wall_thickness::{PATIENT_SD_MM, WallLook, normal, resolutions_mm};
+use super::wall_thickness::{PATIENT_SD_MM, WallLook, mean_and_variance, normal, resolutions_mm};
 
 /// Standard deviation of the resolution that is found, by the walls that a protocol's people have, mm.
 const PEOPLE_SD_MM: f64 = 0.4;
@@ -64,16 +64,7 @@ impl ProtocolResolution {
         }
         let greatest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let shares: Vec<f64> = logarithms.iter().map(|l| (l - greatest).exp()).collect();
-        let sum: f64 = shares.iter().sum();
-        let mean_of = |value: &dyn Fn(f64) -> f64| {
-            let terms = resolutions_mm().zip(&shares);
-            terms
-                .map(|(resolution, share)| value(resolution) * share)
-                .sum::<f64>()
-                / sum
-        };
-        let mean_mm = mean_of(&|resolution| resolution);
-        let variance = mean_of(&|resolution| (resolution - mean_mm).powi(2));
+        let [mean_mm, variance] = mean_and_variance(resolutions_mm(), &shares);
         Some(Self {
             mean_mm,
             sd_mm: (variance + PEOPLE_SD_MM.powi(2)).sqrt(),

@@ -97,13 +97,14 @@ impl WallThickness {
         Self::of_posterior(*look, &posterior)
     }
 
+    /// Its standard deviation over its mean.
+    pub fn sd_share(&self) -> f64 {
+        self.sd_mm / self.mean_mm
+    }
+
     fn of_posterior(look: WallLook, posterior: &[f64]) -> Self {
         let sum: f64 = posterior.iter().sum();
-        let mean_of = |value: &dyn Fn(f64) -> f64| {
-            let terms = grid(THICKNESS_GRID_MM).zip(posterior);
-            terms.map(|(t, p)| value(t) * p).sum::<f64>() / sum
-        };
-        let mean_mm = mean_of(&|t| t);
+        let [mean_mm, variance] = mean_and_variance(grid(THICKNESS_GRID_MM), posterior);
         let percentile = |share: f64| {
             let mut below = 0.0;
             for (t, p) in grid(THICKNESS_GRID_MM).zip(posterior) {
@@ -117,7 +118,7 @@ impl WallThickness {
         };
         Self {
             mean_mm,
-            sd_mm: mean_of(&|t| (t - mean_mm).powi(2)).sqrt(),
+            sd_mm: variance.sqrt(),
             interval_mm: [percentile(0.05), percentile(0.95)],
             look,
         }
@@ -149,6 +150,20 @@ pub(super) fn resolutions_mm() -> impl Iterator<Item = f64> + Clone {
 
 fn grid((least, step, count): (f64, f64, usize)) -> impl Iterator<Item = f64> + Clone {
     (0..count).map(move |n| least + step * n as f64)
+}
+
+/// Mean and variance of `values` that have these weights.
+pub(super) fn mean_and_variance(
+    values: impl Iterator<Item = f64> + Clone,
+    weights: &[f64],
+) -> [f64; 2] {
+    let sum: f64 = weights.iter().sum();
+    let mean_of = |of: &dyn Fn(f64) -> f64| {
+        let terms = values.clone().zip(weights);
+        terms.map(|(value, weight)| of(value) * weight).sum::<f64>() / sum
+    };
+    let mean = mean_of(&|value| value);
+    [mean, mean_of(&|value| (value - mean).powi(2))]
 }
 
 /// A normal density over its greatest value.

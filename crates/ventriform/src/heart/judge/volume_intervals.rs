@@ -40,8 +40,7 @@ impl VolumeIntervals {
         dark_share: f64,
         thickness: Option<&WallThickness>,
     ) -> Self {
-        let share = |thickness: &WallThickness| thickness.sd_mm / thickness.mean_mm;
-        let share = thickness.map_or(UNKNOWN_THICKNESS_SHARE, share);
+        let share = thickness.map_or(UNKNOWN_THICKNESS_SHARE, WallThickness::sd_share);
         let causes = |thickness: f64| ErrorCauses {
             cavity_ml,
             dark_share: dark_share.clamp(0.0, 1.0),
