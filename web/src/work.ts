@@ -4,6 +4,18 @@ import { type Job, type Kind, type ParameterValue, type Volume, post } from "./a
 import { put, watchActive } from "./library";
 import { storedNameOf } from "./words";
 
+const filed = new Set<string>();
+
+/** Whether this tab filed the job. */
+export const isFiledHere = (job: Job): boolean => filed.has(job.id);
+
+function follow(job: Job): Job {
+  filed.add(job.id);
+  put(job);
+  watchActive();
+  return job;
+}
+
 /** What is compared, and with what. */
 export interface Pair {
   stress: Volume;
@@ -15,10 +27,7 @@ export interface Pair {
 export async function fileComparison({ stress, rest, normals, parameters }: Pair): Promise<Job> {
   const labels = { name: storedNameOf(stress).slice(0, 200) };
   const order = { stress: stress.id, rest: rest.id, parameters, labels, ...(normals ? { normals } : {}) };
-  const job = await post<Job>("/v1/comparisons", order);
-  put(job);
-  watchActive();
-  return job;
+  return follow(await post<Job>("/v1/comparisons", order));
 }
 
 export async function file(
@@ -28,8 +37,5 @@ export async function file(
   labels: Record<string, string> = {},
 ): Promise<Job> {
   const name = storedNameOf(volume).slice(0, 200);
-  const job = await post<Job>("/v1/jobs", { kind, volume: volume.id, parameters, labels: { name, ...labels } });
-  put(job);
-  watchActive();
-  return job;
+  return follow(await post<Job>("/v1/jobs", { kind, volume: volume.id, parameters, labels: { name, ...labels } }));
 }

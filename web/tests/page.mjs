@@ -252,6 +252,15 @@ async function typedWhileJobsBegin(page, field) {
     return Promise.all(Array.from({ length: 24 }, (_, n) => file(n + 1)));
   });
   await page.waitForSelector(".job.queued, .job.running");
+  // Their results stand in the list, and do not replace the fit that is corrected.
+  const corrected = await page.textContent(".choices .current");
+  const models = await page.locator(".choices li", { hasText: "Model, 3000 points" }).count();
+  await page.waitForFunction(
+    before =>
+      [...document.querySelectorAll(".choices li")].filter(one => /Model, 3000/.test(one.textContent)).length > before,
+    models,
+  );
+  assert.equal(await page.textContent(".choices .current"), corrected);
   assert.equal(await field.inputValue(), typed);
   await field.press("Tab");
   await page.waitForFunction(() =>

@@ -23,7 +23,7 @@ import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { home, isAt, open, openComparison, route } from "../route";
 import { useWatched } from "../state";
-import { file } from "../work";
+import { file, isFiledHere } from "../work";
 import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study, titleOf } from "../words";
 import { BeatCharts, BeatMaps, PerfusionView } from "./beatview";
 import { LUT, UPTAKE, WALL_LUT, kept } from "./colours";
@@ -89,7 +89,8 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   const [problem, setProblem] = useState("");
   const running = useRef(new Set<string>());
 
-  // A job that ends while its scan is open shows its result.
+  // A job that ends while its scan is open shows its result. While somebody corrects a fit, only a job of this tab does:
+  // another result would replace the one that is corrected, and discard what was typed.
   useEffect(() => {
     for (const job of own) {
       if (isActive(job)) {
@@ -98,7 +99,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       }
       if (!running.current.delete(job.id) || job.state !== "succeeded") continue;
       const made = madeBy(job);
-      if (!made || !isAt(volume.id)) continue;
+      if (!made || !isAt(volume.id) || (scene?.edit.value && !isFiledHere(job))) continue;
       if (job.kind === "comparison") openComparison(made);
       else open(volume.id, made, job.labels["parent"] ?? null);
     }
@@ -374,7 +375,11 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
           type="button"
           aria-expanded={tab === "correct"}
           disabled={!scene}
-          onClick={() => setTab(tab === "correct" ? null : "correct")}>
+          onClick={() => {
+            // Named in the address, so that no later fit takes its place.
+            if (tab !== "correct" && current) open(volume.id, current, otherId);
+            setTab(tab === "correct" ? null : "correct");
+          }}>
           Correct by hand
         </button>
       </div>
