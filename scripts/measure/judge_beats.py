@@ -118,7 +118,7 @@ def main():
                 for name, path in variants(case / "gated.nii.gz", folder):
                     # Together with what it lacks already, the last gate would lack so much that it is left out of the
                     # curve.
-                    if name == "lost" and "count_loss" in [flag["code"] for flag in found["flags"]]:
+                    if name == "lost" and 0.75 / found["gates"][-1]["counts_factor"] < 0.7:
                         continue
                     other = beat(program, path, folder / name)
                     if other.get("ef_percent") is None:

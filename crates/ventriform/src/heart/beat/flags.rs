@@ -1,7 +1,7 @@
 //! Reasons to look closer at a beat.
 
 use super::beside::ActivityBeside;
-use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE};
+use super::study::COUNT_LOSS_LEFT_OUT_SHARE;
 
 /// Share of the orders of the gates that may be as smooth as theirs.
 const ORDERS_AS_SMOOTH: f64 = 0.2;
@@ -21,6 +21,8 @@ const OUTSIDE_SHARE: f64 = 0.01;
 const OUTWARD_MOTION_MM: f64 = -1.0;
 /// Share of a given mass by which that of the wall may differ.
 const MASS_SHARE: f64 = 0.03;
+/// Share of its counts that a gate may have too many.
+const COUNT_GAIN_SHARE: f64 = 0.10;
 /// Share of the beats that may be rejected.
 const REJECTED_SHARE: f64 = 0.2;
 
@@ -39,15 +41,11 @@ pub enum BeatFlag {
         /// Change of the cavity, per cent of the largest.
         ef_percent: f64,
     },
-    /// Gates lack counts.
+    /// Gates lack so many counts that the curve leaves them out.
     #[error(
-        "gates lack counts, as after irregular beats: {}; each was scaled to the usual counts of a gate{}",
-        losses_text(losses),
-        if losses.iter().any(|(_, loss)| *loss > COUNT_LOSS_LEFT_OUT_SHARE) {
-            ", and those that lack more than 30 % were left out of the curve"
-        } else {
-            ""
-        }
+        "gates lack more than {:.0} % of their counts, as after irregular beats: {}; they were left out of the curve",
+        100.0 * COUNT_LOSS_LEFT_OUT_SHARE,
+        losses_text(losses)
     )]
     CountLoss {
         /// Gates, from 1, and the share that each lacks.
@@ -210,13 +208,14 @@ pub(super) fn raised(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
         ..
     } = *facts;
     let no_beat = orders_as_smooth > ORDERS_AS_SMOOTH || ef_percent < LEAST_EF_PERCENT;
-    let beyond = |sign: f64| -> Vec<(usize, f64)> {
+    let beyond = |sign: f64, limit: f64| -> Vec<(usize, f64)> {
         (facts.losses.iter().enumerate())
             .map(|(gate, loss)| (gate + 1, sign * loss))
-            .filter(|(_, share)| *share > COUNT_LOSS_FLAG_SHARE)
+            .filter(|(_, share)| *share > limit)
             .collect()
     };
-    let (losses, gains) = (beyond(1.0), beyond(-1.0));
+    let losses = beyond(1.0, COUNT_LOSS_LEFT_OUT_SHARE);
+    let gains = beyond(-1.0, COUNT_GAIN_SHARE);
     let dark = facts.dark_share;
     let outside = facts.share_outside;
     let outward: Vec<(usize, f64)> = (facts.motions.iter().copied())
