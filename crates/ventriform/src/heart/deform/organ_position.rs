@@ -150,10 +150,7 @@ fn smoothness_about(
     monitor: &Monitor,
 ) -> Result<Option<f64>, Cancelled> {
     let cube = cube_about(&found.cup.centre, SMOOTHNESS_REACH_MM, volume, monitor)?;
-    let ceiling = (SMOOTHNESS_CEILING * found.wall) as f32;
-    let clipped = cube.values().iter().map(|value| value.min(ceiling));
-    let clipped = clipped.collect();
-    let mut cube = cube.with_values(clipped);
+    let mut cube = cube.clipped(SMOOTHNESS_CEILING * found.wall);
     cube.blur(SMOOTHNESS_BLUR_MM, monitor)?;
     Ok(smoothness_mm(cube.values(), cube.shape(), cube.spacing()))
 }

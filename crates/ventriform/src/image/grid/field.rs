@@ -142,6 +142,13 @@ impl Field {
         Self { values, ..self }
     }
 
+    /// The same with `ceiling` in place of greater values.
+    pub fn clipped(mut self, ceiling: f64) -> Self {
+        let ceiling = ceiling as f32;
+        self.values.iter_mut().for_each(|v| *v = v.min(ceiling));
+        self
+    }
+
     /// Number of samples along i, j, k.
     pub fn shape(&self) -> [usize; 3] {
         self.shape

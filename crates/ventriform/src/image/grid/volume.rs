@@ -85,6 +85,17 @@ pub enum ArrayError {
 }
 
 impl Volume {
+    /// The same with `ceiling` in place of greater values; missing values stay.
+    pub fn clipped(&self, ceiling: f32) -> Self {
+        let clip = |v: &f32| if *v > ceiling { ceiling } else { *v };
+        Self {
+            voxels: self.voxels.iter().map(clip).collect(),
+            shape: self.shape,
+            frame: self.frame.clone(),
+            integral: false,
+        }
+    }
+
     /// A volume from an array in memory, i fastest: index `i + nx * (j + ny * k)`, which is the order
     /// of a NumPy array in Fortran order. NaN marks missing values.
     ///

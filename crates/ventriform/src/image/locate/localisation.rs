@@ -142,6 +142,18 @@ impl Cups {
         })
     }
 
+    /// The score of the best cup, if that is a ventricle's and correlates [clearly](super::CLEAR_CORRELATION).
+    pub fn clear_score(&self) -> Option<f64> {
+        let best = self.best(|_| true).ok();
+        let clear = best.filter(|best| best.correlation >= super::CLEAR_CORRELATION);
+        clear.map(|best| best.score)
+    }
+
+    /// The greatest value of the picture.
+    pub fn brightest(&self) -> f64 {
+        f64::from(greatest(&self.field))
+    }
+
     /// Whether `cup` is open at the base, or a hinted centre overrules the question.
     fn is_open(&self, cup: &ScoredCup) -> bool {
         self.hints.centre.is_some() || cup.cup.lid(&self.field, cup.wall) <= MAX_LID_SHARE
@@ -217,12 +229,16 @@ pub fn of_model_about(
 /// The picture for cups of the whole of `volume`, and its greatest value.
 fn picture(volume: &Volume, monitor: &Monitor) -> Result<(Field, f32), LocateError> {
     let field = cup_search::picture(volume, None, monitor)?;
-    let brightest = field.values().iter().fold(0f32, |a, b| a.max(*b));
+    let brightest = greatest(&field);
     let darkest = field.values().iter().fold(f32::INFINITY, |a, b| a.min(*b));
     if !(brightest > 0.0 && brightest > darkest) {
         return Err(LocateError::Blank);
     }
     Ok((field, brightest))
+}
+
+fn greatest(field: &Field) -> f32 {
+    field.values().iter().fold(0f32, |a, b| a.max(*b))
 }
 
 /// Moves `cup` to the nearest best agreement with `field`.

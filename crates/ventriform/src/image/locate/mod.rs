@@ -8,7 +8,10 @@
 //! 2. A cup checks the best proposal ([`cup_search`]): where rays and cup agree, that is the
 //!    heart.
 //! 3. In any other case cups are tried all over the volume, and the best one decides.
-//!    If it is not clear though a hint says where the heart is, cups with a dark arc, as infarcts of one or two
+//!    If it is not clear, they are tried again with values clipped at ever lower ceilings: beside gut many times as hot
+//!    as the heart, a heart is too dark to be a candidate, and the blur of the gut raises its wall on one side. The
+//!    ceiling at which a clear cup scores highest decides.
+//!    If none is clear though a hint says where the heart is, cups with a dark arc, as infarcts of one or two
 //!    territories leave them, are tried as well ([`cup_search::infarcted`]): a whole cup is drawn to whatever is closed
 //!    on all sides beside such a heart. Without a hint they are not believed: they also fit beside hearts.
 //! 4. Where no cup will do either, the heart is doubtful: [`Heart::localisation`] is an error, and
@@ -55,7 +58,7 @@ use crate::base::geometry::bvh::Aabb;
 use crate::base::progress::{Cancelled, Monitor};
 use crate::image::grid::Volume;
 
-use cup_search::{CupSearch, ScoredCup};
+use cup_search::CupSearch;
 pub use error::LocateError;
 pub use hints::Hints;
 pub use hot_voxels::Outshone;
@@ -69,6 +72,9 @@ use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
 const SAME_HEART: f64 = 30.0;
 /// Correlation from which on the cup at a proposal settles the matter.
 const CLEAR_CORRELATION: f64 = 0.75;
+/// Ceilings of the values, shares of the brightest, below which cups are tried where none is clear: hearts whose wall
+/// has from a twentieth of the brightest on. Each is as far below the next as keeps the wall within 0.4 to 1 of one.
+const CEILING_SHARES: [f64; 3] = [0.4, 0.16, 0.064];
 /// Distance that the picture for a cup reaches from its proposal, mm: a large heart and the blur.
 const SURROUNDINGS_MM: f64 = 90.0;
 
@@ -110,9 +116,12 @@ pub fn find<'v>(
         (Some(cavity), Some(cup)) => Decision::Rays(cavity, Box::new(cup)),
         _ => {
             let mut cups = Cups::everywhere(volume, hints, monitor)?;
-            let clear = |best: &ScoredCup| best.correlation >= CLEAR_CORRELATION;
-            if hints.centre.is_some() && !cups.best(|_| true).is_ok_and(clear) {
-                cups.add_infarcted(monitor)?;
+            if cups.clear_score().is_none() {
+                match below_hot_organs(volume, cups.brightest(), hints, monitor)? {
+                    Some(clear) => cups = clear,
+                    None if hints.centre.is_some() => cups.add_infarcted(monitor)?,
+                    None => {}
+                }
             }
             let place = match cups.best(|_| true) {
                 Ok(best) => Some(best.cup.centre),
@@ -128,6 +137,27 @@ pub fn find<'v>(
         rays,
         decision,
     })
+}
+
+/// The cups of `volume` below the ceiling at which the best one is clear and scores highest; `None` where none is
+/// clear. `brightest` is the greatest value of the picture that cups are compared with.
+fn below_hot_organs(
+    volume: &Volume,
+    brightest: f64,
+    hints: &Hints,
+    monitor: &Monitor,
+) -> Result<Option<Cups>, LocateError> {
+    let mut best: Option<(f64, Cups)> = None;
+    for share in CEILING_SHARES {
+        let clipped = volume.clipped((share * brightest) as f32);
+        let cups = Cups::everywhere(&clipped, hints, monitor)?;
+        if let Some(score) = cups.clear_score()
+            && best.as_ref().is_none_or(|(other, _)| score > *other)
+        {
+            best = Some((score, cups));
+        }
+    }
+    Ok(best.map(|(_, cups)| cups))
 }
 
 /// The cup that fits best about `cavity`, if it shows a ventricle there.
@@ -305,6 +335,43 @@ mod tests {
                 found.infarcted && found.confidence <= 0.5,
                 "{left:?}: {found:?}"
             );
+        }
+    }
+
+    /// `volume` with a loop of gut below `heart`, `times` as bright as the phantom's wall.
+    fn beside_gut(mut volume: Volume, heart: &Vec3, times: f64) -> Volume {
+        let [nx, ny, _] = volume.shape;
+        let middle = heart - Vec3::new(20.0, 0.0, 105.0);
+        for v in 0..volume.voxels.len() {
+            let index = [v % nx, v / nx % ny, v / (nx * ny)].map(|i| i as f64);
+            let p = volume.frame.to_patient(&Vec3::from(index)) - middle;
+            let off = (p.x.hypot(p.y) - 45.0).hypot(p.z);
+            let share = (-0.5 * (off / 9.0).powi(2)).exp();
+            volume.voxels[v] += (times * small().wall_value * share) as f32;
+        }
+        volume
+    }
+
+    #[test]
+    fn a_heart_beside_gut_twenty_times_as_hot_is_found_and_none_is_found_without_one() {
+        let usual = scan(&small());
+        let alone = centres(&usual, &Hints::default()).1;
+        for times in [5.0, 12.0, 20.0] {
+            let found = centres(&beside_gut(usual.clone(), &alone, times), &Hints::default()).1;
+            assert!((found - alone).norm() < 6.0, "{times}: {found} {alone}");
+            let dark = |segment| PerfusionDefect {
+                segment,
+                severity: 1.0,
+            };
+            let erased = scan(&PhantomParameters {
+                defects: (1..=17).map(dark).collect(),
+                right_ventricle: 0.0,
+                ..small()
+            });
+            let monitor = Monitor::silent();
+            let erased = beside_gut(erased, &alone, times);
+            let heart = find(&erased, &Hints::default(), &monitor).unwrap();
+            assert!(heart.localisation().is_err(), "{times}");
         }
     }
 
