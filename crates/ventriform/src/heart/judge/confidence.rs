@@ -11,7 +11,7 @@
 //!    simulated hearts ([`calibration`]). Hearts that are hard to fit are over-represented, so the chances are
 //!    cautious.
 //! 2. Of several fits the mean logarithm of the odds scatters less than that of one.
-//! 3. Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join the chances.
+//! 3. The projections of the image ([`Views::gain`]) join the chances.
 //!
 //! Guaranteed: a chance rises or falls with each figure alone but the size of the cavity: fits of very small and very
 //! large hearts are worse than others. Not guaranteed: that a displaced heart is noticed. A
@@ -92,8 +92,7 @@ pub fn log_odds(chance: f64) -> f64 {
     ((chance + 0.01) / (1.01 - chance)).ln()
 }
 
-/// The chance that the patient moved during the scan, 0..=1: by the shape of the wall, and by the projections
-/// where it is known how the patient lay.
+/// The chance that the patient moved during the scan, 0..=1: by the shape of the wall, and by the projections.
 pub fn of_motion(e: &Evidence) -> f64 {
     let values = [
         e.active,
@@ -113,7 +112,7 @@ pub fn of_motion(e: &Evidence) -> f64 {
 }
 
 /// The chance that what was fitted is a left ventricle in its position, 0..=1, where the search has the confidence
-/// `search`; `None` where it is unknown how the patient lay.
+/// `search`; `None` where the wall projects to nothing.
 ///
 /// No image without a heart is as dark within a ring as a ventricle and shows the fitted wall in all projections.
 pub fn of_heart(e: &Evidence, search: f64) -> Option<f64> {

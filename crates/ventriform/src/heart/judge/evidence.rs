@@ -54,7 +54,7 @@ pub struct Evidence {
     /// Share of the wall beside which, 12 to 18 mm beyond its outer surface, something takes up more than
     /// half as much as the bright wall does, 0..=1: other organs, or the wall's own image elsewhere.
     pub beside: f64,
-    /// Figures of the projections of the image; `None` where it is unknown how the patient lay.
+    /// Figures of the projections of the image; `None` where the wall projects to nothing.
     pub views: Option<Views>,
 }
 

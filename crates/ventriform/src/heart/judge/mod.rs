@@ -146,14 +146,12 @@ fn evidence_of(
         strain: model.strain.sqrt(),
     };
     let orientation = &setup.patient_orientation;
+    let mesh = model.apparent_mesh();
     let views = match orientation.source {
-        OrientationSource::Unknown => None,
-        _ => Views::new(
-            model.apparent_mesh(),
-            &orientation.superior,
-            volume,
-            monitor,
-        )?,
+        OrientationSource::Unknown => {
+            Views::about_axis(mesh, &found.cup.axis, volume, found.wall, monitor)?
+        }
+        _ => Views::new(mesh, &orientation.superior, volume, found.wall, monitor)?,
     };
     let hollowness = found.hollowness;
     Ok(Evidence::new(wall, &edges, hollowness, &setup.field, views))

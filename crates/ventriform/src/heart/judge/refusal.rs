@@ -1,7 +1,7 @@
 //! Whether what was fitted is a heart at all.
 //!
 //! In go a fitted model and its judgement; out comes [`LocateError::NoHeart`] with the reason where it is more likely
-//! none. [`confidence::of_heart`] decides, or, in a map of labels and where it is unknown how the patient lay, limits
+//! none. [`confidence::of_heart`] decides, or, in a map of labels and where the wall projects to nothing, limits
 //! on edges, search and chance. Not guaranteed: a hot right ventricle alone may be taken for a left one.
 
 use super::Judgement;
@@ -28,7 +28,7 @@ const MIN_HEART_PROBABILITY: f64 = 0.5;
 const MAX_OUTSIDE_PERCENT: f64 = 50.0;
 
 /// Refuses a ventricle that is more likely none: by [`confidence::of_heart`], or, in a map of labels and
-/// where it is unknown how the patient lay, one whose model found no wall or that neither the search nor the fit
+/// where the wall projects to nothing, one whose model found no wall or that neither the search nor the fit
 /// believes in. A hint says that it is there.
 ///
 /// # Errors
