@@ -105,7 +105,10 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
     let raised = |code: &str| report.flags.iter().any(|flag| flag.code == code);
     let mut checks: Vec<(bool, String)> = [
         ("no_contraction", "The gates are moments of one beat"),
-        ("count_loss", "No gate lacks so many counts that it was left out of the curve"),
+        (
+            "count_loss",
+            "No gate lacks so many counts that it was left out of the curve",
+        ),
         ("count_gain", "No gate has too many counts"),
         ("leaves_field", "The heart lies inside of the volume"),
         ("dark_wall", "The wall takes up enough to show its motion"),
