@@ -51,8 +51,8 @@ pub use kind::{GroupSex, ScanKind, Sex, yes_or_no};
 pub use matching::{MATCHED_Z, Matched, matched};
 pub use pattern::{Coefficients, PATTERN_TERMS, TermMatrix};
 pub use perfusion::{
-    DEFICIT_OF_FULL_SCORE, FigureBeside, HeartFigure, NormalsUsed, Perfusion, SegmentPerfusion,
-    TerritoryPerfusion, Z_LIMIT, apply, summed_percent,
+    DEFICIT_OF_FULL_SCORE, FigureBeside, HeartFigure, NoisyScores, NormalsUsed, Perfusion,
+    SegmentPerfusion, TerritoryPerfusion, Z_LIMIT, apply, summed_percent,
 };
 pub use place_limits::{PlaceLimits, ScanPlaces};
 pub use sizes::{FEW_CASES, FEWEST_CASES, NORMALS_SCHEMA_VERSION};

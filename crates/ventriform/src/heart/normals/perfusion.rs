@@ -57,6 +57,8 @@ pub struct Perfusion {
     pub figures: Vec<FigureBeside>,
     /// Reasons to look closer.
     pub flags: Vec<NormalsFlag>,
+    /// The compared places.
+    wall: ScoredWall,
 }
 
 /// The group of normal limits that a scan was compared with.
@@ -238,6 +240,7 @@ pub(super) struct Figures {
     pub deficit_percent: f64,
     pub segments: [SegmentPerfusion; 17],
     pub territories: [TerritoryPerfusion; 3],
+    pub wall: ScoredWall,
 }
 
 impl Figures {
@@ -274,55 +277,30 @@ pub fn score_of(deficit: f64, relative_sd: f64) -> f64 {
 pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures> {
     let places = limits.compared(scan);
     let scale = matched_places(&places, &limits.precision())?;
-    let mut z = vec![None; scan.uptake.len()];
-    let mut scores = z.clone();
-    let mut of_segment = [Sums::default(); 17];
-    for place in &places {
-        let (own_z, expected) = (scale.z(place), scale.expected(place));
-        let deficit = 1.0 - place.uptake / scale.counts / expected;
-        let score = score_of(deficit, place.sd / expected);
-        (z[place.index], scores[place.index]) = (Some(own_z), Some(score));
-        let low = if own_z < -Z_LIMIT { place.area } else { 0.0 };
-        let sums = &mut of_segment[scan.segment[place.index] - 1];
-        *sums = sums.add(Sums {
-            area: place.area,
-            z: place.area * own_z,
-            score: place.area * score,
-            low,
-            severity: low * own_z.abs(),
-        });
-    }
+    let scored = places.iter().map(|place| ScoredPlace {
+        index: place.index,
+        segment: scan.segment[place.index],
+        area: place.area,
+        uptake: place.uptake / scale.counts,
+        expected: scale.expected(place),
+        sd: place.sd,
+    });
     let mut areas = [0.0; 17];
     for (segment, area) in scan.segment.iter().zip(&scan.area) {
         areas[segment - 1] += area;
     }
-    let segments: [SegmentPerfusion; 17] = std::array::from_fn(|index| {
-        let sums = of_segment[index];
-        let known = sums.area > 0.0;
-        SegmentPerfusion {
-            segment: index + 1,
-            z: known.then(|| sums.z / sums.area),
-            score: known.then(|| (sums.score / sums.area).round().clamp(0.0, FULL_SCORE) as u8),
-            extent_percent: sums.extent_percent(),
-            deficit_percent: sums.deficit_percent(),
-            compared_percent: percent(sums.area, areas[index]),
-        }
-    });
-    let territories = ARTERY_NAMES.map(|name| {
-        let sums = segments_of(name).fold(Sums::default(), |sum, segment| {
-            sum.add(of_segment[segment - 1])
-        });
-        TerritoryPerfusion {
-            name,
-            extent_percent: sums.extent_percent(),
-            deficit_percent: sums.deficit_percent(),
-            summed_score: segments_of(name)
-                .filter_map(|segment| segments[segment - 1].score)
-                .map(u32::from)
-                .sum(),
-        }
-    });
-    let all = of_segment.into_iter().fold(Sums::default(), Sums::add);
+    let wall = ScoredWall {
+        places: scored.collect(),
+        areas,
+    };
+    let tally = wall.tally(|_| 0.0);
+    let mut z = vec![None; scan.uptake.len()];
+    let mut scores = z.clone();
+    for place in &wall.places {
+        z[place.index] = Some(place.z(0.0));
+        scores[place.index] = Some(place.score(0.0));
+    }
+    let all = tally.all();
     Some(Figures {
         scale: scale.counts,
         pattern: scale.pattern,
@@ -333,9 +311,143 @@ pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures
         extent_percent: all.extent_percent(),
         severity: (all.low > 0.0).then(|| all.severity / all.low),
         deficit_percent: all.deficit_percent(),
-        segments,
-        territories,
+        segments: tally.segments(&areas),
+        territories: tally.territories(),
+        wall,
     })
+}
+
+/// A place of a scan beside its normal mean. Uptake is in units of a normal mean of 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ScoredPlace {
+    index: usize,
+    /// 1 to 17.
+    segment: usize,
+    area: f64,
+    uptake: f64,
+    expected: f64,
+    sd: f64,
+}
+
+impl ScoredPlace {
+    /// Standard deviations from the normal mean, with `more` uptake.
+    fn z(&self, more: f64) -> f64 {
+        (self.uptake + more - self.expected) / self.sd
+    }
+
+    fn score(&self, more: f64) -> f64 {
+        let deficit = 1.0 - (self.uptake + more) / self.expected;
+        score_of(deficit, self.sd / self.expected)
+    }
+}
+
+/// The compared places of a scan, and the areas of its segments.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ScoredWall {
+    places: Vec<ScoredPlace>,
+    areas: [f64; 17],
+}
+
+impl ScoredWall {
+    /// The sums over the segments with `more` uptake at each place.
+    fn tally(&self, more: impl Fn(usize) -> f64) -> Tally {
+        let mut of_segment = [Sums::default(); 17];
+        for place in &self.places {
+            let more = more(place.index);
+            let z = place.z(more);
+            let low = if z < -Z_LIMIT { place.area } else { 0.0 };
+            let sums = &mut of_segment[place.segment - 1];
+            *sums = sums.add(Sums {
+                area: place.area,
+                z: place.area * z,
+                score: place.area * place.score(more),
+                low,
+                severity: low * z.abs(),
+            });
+        }
+        Tally(of_segment)
+    }
+}
+
+/// Sums over the places of each segment.
+struct Tally([Sums; 17]);
+
+impl Tally {
+    fn all(&self) -> Sums {
+        self.0.into_iter().fold(Sums::default(), Sums::add)
+    }
+
+    fn score(&self, segment: usize) -> Option<u8> {
+        let sums = self.0[segment - 1];
+        let mean = sums.score / sums.area;
+        (sums.area > 0.0).then(|| mean.round().clamp(0.0, FULL_SCORE) as u8)
+    }
+
+    fn segments(&self, areas: &[f64; 17]) -> [SegmentPerfusion; 17] {
+        std::array::from_fn(|index| {
+            let sums = self.0[index];
+            SegmentPerfusion {
+                segment: index + 1,
+                z: (sums.area > 0.0).then(|| sums.z / sums.area),
+                score: self.score(index + 1),
+                extent_percent: sums.extent_percent(),
+                deficit_percent: sums.deficit_percent(),
+                compared_percent: percent(sums.area, areas[index]),
+            }
+        })
+    }
+
+    fn territories(&self) -> [TerritoryPerfusion; 3] {
+        ARTERY_NAMES.map(|name| {
+            let own = segments_of(name).map(|segment| self.0[segment - 1]);
+            let sums = own.fold(Sums::default(), Sums::add);
+            let scores = segments_of(name).filter_map(|segment| self.score(segment));
+            TerritoryPerfusion {
+                name,
+                extent_percent: sums.extent_percent(),
+                deficit_percent: sums.deficit_percent(),
+                summed_score: scores.map(u32::from).sum(),
+            }
+        })
+    }
+}
+
+/// Scores of a scan whose uptake was changed by noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NoisyScores {
+    /// Share of the compared wall below the limit, per cent.
+    pub extent_percent: f64,
+    /// Mean score of the compared wall, per cent of the full score.
+    pub deficit_percent: f64,
+    /// The segments' scores, 0 to 4.
+    pub segments: [Option<u8>; 17],
+}
+
+impl NoisyScores {
+    /// Sum of the segments' scores.
+    pub fn summed_score(&self) -> u32 {
+        self.segments.iter().flatten().copied().map(u32::from).sum()
+    }
+
+    /// What the segments' scores exceed those of `rest` by, summed.
+    pub fn more_than(&self, rest: &Self) -> u32 {
+        let pairs = self.segments.iter().zip(rest.segments);
+        let more = pairs.filter_map(|(own, rest)| Some((*own)?.saturating_sub(rest?)));
+        more.map(u32::from).sum()
+    }
+}
+
+impl Perfusion {
+    /// The scores with `noise` at every place of the map, image units, on the same scale.
+    pub fn with_noise(&self, noise: impl Fn(usize) -> f64) -> NoisyScores {
+        let tally = self.wall.tally(|index| noise(index) / self.scale);
+        let all = tally.all();
+        NoisyScores {
+            extent_percent: all.extent_percent(),
+            deficit_percent: all.deficit_percent(),
+            segments: std::array::from_fn(|index| tally.score(index + 1)),
+        }
+    }
 }
 
 /// `map` and the `heart`'s figures against the group of `limits` for a scan of this kind.
@@ -386,6 +498,7 @@ pub fn apply(
             .collect(),
         z: found.z,
         scores: found.scores,
+        wall: found.wall,
     })
 }
 
