@@ -11,8 +11,10 @@
 
 use anyhow::{Result, anyhow};
 use serde_json::Value;
+use std::ops::Range;
 use std::path::Path;
 use ventriform::base::progress::Monitor;
+use ventriform::heart::polar::{RAY_COLUMNS, RAY_ROWS};
 use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::ComparisonParameters;
 use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
@@ -20,7 +22,7 @@ use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrd
 fn main() -> Result<()> {
     println!(
         "pair,kind,comparable,true_tid,tid,tid_apparent,muscle,resolution_stress,resolution_rest,turn,turn_gain,correlation,matched,\
-         sd_points,reversible,true_reversible,territory,true_territory,fixed,flags"
+         sd_points,smooth_points,fine_points,noise_points,sd_apical,sd_middle,sd_basal,largest_sds,detectable,reversible,reversible_low,reversible_high,true_reversible,territory,true_territory,fixed,verdict,flags"
     );
     for folder in std::env::args().skip(1) {
         match row(Path::new(&folder)) {
@@ -47,6 +49,7 @@ fn row(folder: &Path) -> Result<String> {
     let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())
         .map_err(|error| anyhow!("{error}"))?;
     let change = &made.change;
+    let answer = change.answers.reversible;
     let apparent = |heart: &ComparedHeart| {
         let surfaces = heart.segmentation().fit.model.surfaces.as_ref();
         surfaces.map_or(f64::NAN, |both| both.apparent.wall.cavity_ml)
@@ -61,7 +64,7 @@ fn row(folder: &Path) -> Result<String> {
     let mut flags: Vec<&str> = made.flags.iter().map(|flag| flag.code()).collect();
     flags.dedup();
     Ok(format!(
-        "{},{},{},{},{:.3},{:.3},{:.3},{:.2},{:.2},{:.1},{:.3},{:.3},{:.0},{:.2},{:.1},{},{},{},{:.1},{}",
+        "{},{},{},{},{:.3},{:.3},{:.3},{:.2},{:.2},{:.1},{:.3},{:.3},{:.0},{:.2},{},{},{:.1},{:.1},{:.1},{},{},{},{:.1},{},{}",
         truth["pair"].as_str().unwrap_or_default(),
         truth["kind"].as_str().unwrap_or_default(),
         truth["comparable"],
@@ -75,26 +78,50 @@ fn row(folder: &Path) -> Result<String> {
         change.turn.gain,
         change.turn.correlation,
         change.matched_percent,
-        deviation(&made),
-        change.reversible_percent,
+        deviation(&made, 0..RAY_ROWS),
+        noise(&made),
+        detected(&made),
+        answer.value,
+        answer.interval[0],
+        answer.interval[1],
         truth["reversible_percent"],
         worst.map_or("", |worst| worst.name),
         truth["reversible"]["territory"]
             .as_str()
             .unwrap_or_default(),
-        change.fixed_percent,
+        change.answers.fixed.value,
+        answer.verdict.as_str().replace(' ', "_"),
         flags.join(" ")
     ))
 }
 
-/// Root mean square of the difference over the compared places, points.
-fn deviation(made: &ComparedHearts) -> f64 {
-    let known: Vec<f64> = made
-        .change
-        .difference_points
-        .iter()
-        .flatten()
-        .copied()
-        .collect();
+/// The noise that was estimated, and the deviation of the difference in thirds of the map, points.
+fn noise(made: &ComparedHearts) -> String {
+    let noise = made.change.noise;
+    format!(
+        "{:.2},{:.2},{:.2},{:.2},{:.2},{:.2}",
+        noise.smooth_points,
+        noise.fine_points,
+        noise.points,
+        deviation(made, 0..8),
+        deviation(made, 8..16),
+        deviation(made, 16..RAY_ROWS)
+    )
+}
+
+/// The greatest loss in deviations of the noise of its place, and the least loss that would show.
+fn detected(made: &ComparedHearts) -> String {
+    let change = &made.change;
+    let places = change.difference_points.iter().enumerate();
+    let losses = places.filter_map(|(index, own)| Some((*own)? / change.noise.at(index)));
+    let largest = losses.fold(f64::MIN, f64::max);
+    let answers = &change.answers;
+    format!("{largest:.2},{:.1}", answers.detectable_percent)
+}
+
+/// Root mean square of the difference over the compared places of some rows, points.
+fn deviation(made: &ComparedHearts, rows: Range<usize>) -> f64 {
+    let places = &made.change.difference_points[rows.start * RAY_COLUMNS..rows.end * RAY_COLUMNS];
+    let known: Vec<f64> = places.iter().flatten().copied().collect();
     (known.iter().map(|d| d * d).sum::<f64>() / known.len() as f64).sqrt()
 }

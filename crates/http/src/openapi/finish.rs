@@ -416,7 +416,7 @@ mod tests {
         for (name, schema) in schemas {
             for row in schema["x-figures"].as_array().into_iter().flatten() {
                 rows += 1;
-                for place in ["place", "interval", "needs", "unless"] {
+                for place in ["place", "interval", "verdict", "needs", "unless"] {
                     let Some(place) = row[place].as_str() else {
                         continue;
                     };

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 
 use ventriform::base::geometry::Vec3;
 use ventriform::base::progress::{CancelToken, Monitor, Observer, Stage};
-use ventriform::heart::comparison::{REVERSIBLE_POINTS, WhichScan};
+use ventriform::heart::comparison::{Verdict, WhichScan};
 use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use ventriform::image::volume::{ReadLimits, Volume, VolumeFile};
@@ -71,8 +71,12 @@ fn scaled(volume: &Volume, factor: f32) -> Volume {
 fn a_defect_at_stress_alone_is_reversible_and_one_in_both_is_fixed() {
     let made = compared(&scan(1, 0.6), &scan(2, 0.0)).unwrap();
     let change = &made.change;
-    assert!(change.reversible_percent > 8.0, "{change:?}");
-    assert!(change.fixed_percent < 2.0, "{}", change.fixed_percent);
+    assert!(change.answers.reversible.value > 8.0, "{change:?}");
+    assert!(
+        change.answers.fixed.value < 2.0,
+        "{}",
+        change.answers.fixed.value
+    );
     let losses = |in_defect: bool| {
         let own = change.segments.iter();
         own.filter(move |own| LAD_SEGMENTS.contains(&(own.segment as u8)) == in_defect)
@@ -81,18 +85,19 @@ fn a_defect_at_stress_alone_is_reversible_and_one_in_both_is_fixed() {
     let least = losses(true).fold(f64::MAX, f64::min);
     // Blur carries some of the loss into the next segments.
     let most = losses(false).fold(f64::MIN, f64::max);
-    assert!(least > 1.5 * REVERSIBLE_POINTS, "{least}");
+    assert!(least > 1.5 * change.limit_points(), "{least}");
     assert!(most < 0.6 * least, "{most} of {least}");
     let [lad, lcx, rca] = change.territories.map(|own| own.figures.reversible_percent);
     assert!(lad > 50.0 && lcx < 20.0 && rca < 20.0, "{lad} {lcx} {rca}");
+    assert_eq!(change.answers.reversible.verdict, Verdict::Yes);
 
     // The other way round nothing is lost at stress.
     let swapped = compared(&scan(2, 0.0), &scan(1, 0.6)).unwrap();
-    assert!(swapped.change.reversible_percent < 2.0);
+    assert!(swapped.change.answers.reversible.value < 2.0);
 
     let fixed = compared(&scan(1, 0.6), &scan(2, 0.6)).unwrap();
-    assert!(fixed.change.reversible_percent < 2.0);
-    assert!(fixed.change.fixed_percent > 8.0, "{:?}", fixed.change);
+    assert!(fixed.change.answers.reversible.value < 2.0);
+    assert!(fixed.change.answers.fixed.value > 8.0, "{:?}", fixed.change);
 }
 
 #[test]
@@ -101,12 +106,15 @@ fn an_unchanged_heart_has_no_reversible_wall_and_cavities_alike() {
         let made = compared(&scan(stress, 0.0), &scan(rest, 0.0)).unwrap();
         let change = &made.change;
         assert!(
-            change.reversible_percent < 3.0,
+            change.answers.reversible.value < 3.0,
             "{}",
-            change.reversible_percent
+            change.answers.reversible.value
         );
         assert!((made.tid() - 1.0).abs() < 0.05, "{}", made.tid());
         assert_eq!(change.turn.degrees, 0.0);
+        assert_ne!(change.answers.reversible.verdict, Verdict::Yes);
+        let [low, high] = made.tid_answer().interval;
+        assert!(low < 1.0 && 1.0 < high, "{low} {high}");
         assert!(change.matched_percent > 80.0, "{}", change.matched_percent);
     }
 }
@@ -117,7 +125,7 @@ fn a_factor_changes_no_figure() {
     let made = compared(&stress, &rest).unwrap();
     let brighter = compared(&scaled(&stress, 8.0), &rest).unwrap();
     assert!((brighter.change.scale / made.change.scale - 8.0).abs() < 1e-3);
-    let percent = |made: &ComparedHearts| made.change.reversible_percent;
+    let percent = |made: &ComparedHearts| made.change.answers.reversible.value;
     assert!((percent(&brighter) - percent(&made)).abs() < 0.1);
     assert!((brighter.tid() - made.tid()).abs() < 1e-3);
 }

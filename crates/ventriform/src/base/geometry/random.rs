@@ -25,6 +25,8 @@ pub enum Purpose {
     Pose = 6,
     /// The differences between healthy phantoms.
     PhantomPerson = 7,
+    /// Noise of the difference of two scans.
+    ComparisonNoise = 8,
 }
 
 /// The generator of the stream for `purpose` with this seed.

@@ -1,17 +1,12 @@
 //! The difference of two polar maps of one heart, and what it says of places, segments and territories.
 
-use super::calibration::DIFFERENCE_SD_POINTS;
-use super::scale::{Sides, matched};
-use super::turn::{self, Turn};
-use crate::heart::normals::ScanPlaces;
-use crate::heart::polar::{ARTERY_NAMES, MapGaussian, segments_of};
-
-/// Loss of uptake at stress beyond which wall is reversible, per cent of the rest map's reference.
-pub const REVERSIBLE_POINTS: f64 = 2.5 * DIFFERENCE_SD_POINTS;
-/// Standard deviations of the smoothing of the difference, rows and columns.
-const SMOOTHING_PLACES: [f64; 2] = [1.2, 2.4];
-/// Rows and columns on either side that it takes in.
-const SMOOTHING_REACH: [usize; 2] = [4, 8];
+use super::answers::Answers;
+use super::calibration::LIMIT_SDS;
+use super::noise::Noise;
+use super::scale::Sides;
+use super::side_by_side::{Changes, Compared};
+use super::turn::Turn;
+use crate::heart::polar::{ARTERY_NAMES, segments_of};
 
 /// The change from rest to stress.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,10 +22,12 @@ pub struct Change {
     /// Rest less stress, smoothed, per cent of the rest map's reference, on its places: row by row from apex to base,
     /// positive where stress lacks uptake; `None` without muscle in both.
     pub difference_points: Vec<Option<f64>>,
-    /// Share of the compared wall that loses more than [`REVERSIBLE_POINTS`], per cent.
-    pub reversible_percent: f64,
-    /// Share of the compared wall below the rest map's threshold in both, per cent.
-    pub fixed_percent: f64,
+    /// The noise of the difference.
+    pub noise: Noise,
+    /// Shares of the compared wall that changed, with what noise lets them be.
+    pub answers: Answers,
+    /// What stress lacks in and about the wall that is reversible, per cent of the whole wall's uptake at rest.
+    pub lost_percent: f64,
     /// The segments 1 to 17.
     pub segments: [ComparedSegment; 17],
     /// The territories LAD, LCX and RCA.
@@ -108,57 +105,46 @@ impl Sums {
 }
 
 impl Change {
+    /// Loss of uptake that noise does not explain, per cent of the rest map's reference.
+    pub fn limit_points(&self) -> f64 {
+        LIMIT_SDS * self.noise.points
+    }
+
     /// The change between two maps; `None` where no wall can be compared, or one of them has no uptake.
     pub fn between(sides: &Sides<'_>) -> Option<Self> {
         let turn = Turn::from_sides(sides);
-        let rest = ScanPlaces::from_map(sides.rest);
-        let stress = ScanPlaces {
-            uptake: turn::turned(sides.stress, turn.degrees),
-            ..rest.clone()
-        };
-        let reference = sides.rest.reference;
-        let matched = matched(&stress, &rest, reference)?;
-        // Uptake at stress and at rest, per cent of the rest map's reference.
-        let percents: Vec<Option<[f64; 2]>> = (stress.uptake.iter().zip(&rest.uptake))
-            .map(|(stress, rest)| {
-                let stress = 100.0 * (*stress)? / (reference * matched.counts);
-                Some([stress, 100.0 * (*rest)? / reference])
-            })
-            .collect();
-        let raw: Vec<Option<f64>> = (percents.iter())
-            .map(|both| both.map(|[stress, rest]| rest - stress))
-            .collect();
-        let difference_points = smoothed(&raw, &rest.area);
-        let threshold = 100.0 * sides.rest.threshold;
+        let both = Compared::new(sides, turn.degrees)?;
+        let changes = both.changes(&both.difference);
         let mut of_segment = [Sums::default(); 17];
-        for (index, (both, difference)) in percents.iter().zip(&difference_points).enumerate() {
-            let (Some([stress, at_rest]), Some(difference)) = (*both, *difference) else {
+        for index in 0..both.areas.len() {
+            let (Some(stress), Some(at_rest), Some(difference)) =
+                (both.stress[index], both.rest[index], both.difference[index])
+            else {
                 continue;
             };
-            let area = rest.area[index];
+            let area = both.areas[index];
             let counted = |is: bool| if is { area } else { 0.0 };
-            let reversible = difference > REVERSIBLE_POINTS;
-            let sums = &mut of_segment[rest.segment[index] - 1];
+            let sums = &mut of_segment[both.segment[index] - 1];
             *sums = sums.add(Sums {
                 area,
                 stress: area * stress,
                 rest: area * at_rest,
                 difference: area * difference,
-                reversible: counted(reversible),
-                fixed: counted(!reversible && stress < threshold && at_rest < threshold),
+                reversible: counted(changes.lost.within[index]),
+                fixed: counted(both.is_fixed(&changes, index, [stress, at_rest])),
             });
         }
         let all = of_segment.into_iter().fold(Sums::default(), Sums::add);
-        let wall: f64 = rest.area.iter().sum();
-        let whole = all.figures();
+        let wall = sides.rest.pixels.iter().flatten();
+        let wall: f64 = wall.map(|pixel| pixel.area).sum();
         Some(Self {
             turn,
-            scale: matched.counts,
-            matched_percent: 100.0 * matched.share,
+            scale: both.matched.counts,
+            matched_percent: 100.0 * both.matched.share,
             compared_percent: 100.0 * all.area / wall,
-            difference_points,
-            reversible_percent: whole.reversible_percent,
-            fixed_percent: whole.fixed_percent,
+            noise: both.noise,
+            answers: Answers::new(&both),
+            lost_percent: lost_percent(&both, &changes),
             segments: std::array::from_fn(|index| ComparedSegment {
                 segment: index + 1,
                 figures: of_segment[index].figures(),
@@ -172,18 +158,19 @@ impl Change {
                     figures: sums.figures(),
                 }
             }),
+            difference_points: both.difference,
         })
     }
 }
 
-/// The differences in the mean over neighbouring places that have one, each by its area and a Gaussian.
-fn smoothed(differences: &[Option<f64>], areas: &[f64]) -> Vec<Option<f64>> {
-    let values: Vec<f64> = differences.iter().map(|own| own.unwrap_or(0.0)).collect();
-    let weights: Vec<f64> = (differences.iter().zip(areas))
-        .map(|(own, area)| own.map_or(0.0, |_| *area))
-        .collect();
-    let means = MapGaussian::new(SMOOTHING_PLACES, SMOOTHING_REACH).means(&values, &weights);
-    (means.into_iter().zip(&weights))
-        .map(|(mean, weight)| (*weight > 0.0).then_some(mean))
-        .collect()
+/// What stress lacks in and about the wall that is reversible, per cent of the whole wall's uptake at rest.
+fn lost_percent(both: &Compared, changes: &Changes) -> f64 {
+    let (mut lost, mut whole) = (0.0, 0.0);
+    for (index, area) in both.areas.iter().enumerate() {
+        let about = changes.lost.about[index];
+        let own = both.difference[index].filter(|_| about);
+        lost += area * own.unwrap_or(0.0);
+        whole += area * both.uptake[index];
+    }
+    100.0 * lost / whole
 }

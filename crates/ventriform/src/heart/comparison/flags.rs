@@ -68,6 +68,11 @@ pub enum ComparisonFlag {
         /// At rest.
         rest: String,
     },
+    /// Noise hides large losses.
+    FewCounts {
+        /// The least loss of a territory that shows in nine of ten scans, per cent.
+        detectable_percent: f64,
+    },
     /// The scale between the scans stands on little of the wall.
     ScaleUncertain {
         /// Share of the wall by which stress was scaled, per cent.
@@ -148,6 +153,7 @@ impl ComparisonFlag {
             Self::RoleNotStated { .. } => "role_not_stated",
             Self::NotStated { .. } => "not_stated",
             Self::MadeOtherwise { .. } => "made_otherwise",
+            Self::FewCounts { .. } => "few_counts",
             Self::ScaleUncertain { .. } => "scale_uncertain",
             Self::Turned { .. } => "turned",
             Self::OfScan { code, .. } | Self::OfLimits { code, .. } => code,
@@ -183,6 +189,11 @@ impl fmt::Display for ComparisonFlag {
                 stress,
                 rest,
             } => write!(f, "{field} differs: {stress} at stress, {rest} at rest"),
+            Self::FewCounts { detectable_percent } => write!(
+                f,
+                "noise hides losses: a territory has to lose {detectable_percent:.0} % of its uptake to be found nine \
+                 times in ten"
+            ),
             Self::ScaleUncertain { percent } => write!(
                 f,
                 "only {percent:.0} % of the wall is unchanged, and stress was scaled by that part: all differences \

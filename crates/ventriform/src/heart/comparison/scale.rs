@@ -1,6 +1,6 @@
 //! The scale of the stress scan to the rest scan.
 
-use super::calibration::DIFFERENCE_SD_POINTS;
+use super::noise::Noise;
 use crate::heart::normals::{self, Matched, PlaceLimits, ScanPlaces, TermMatrix};
 use crate::heart::polar::PolarMap;
 
@@ -15,12 +15,17 @@ pub struct Sides<'a> {
 
 /// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the
 /// normal mean.
-pub(super) fn matched(stress: &ScanPlaces, rest: &ScanPlaces, reference: f64) -> Option<Matched> {
+pub(super) fn matched(
+    stress: &ScanPlaces,
+    rest: &ScanPlaces,
+    reference: f64,
+    noise: Noise,
+) -> Option<Matched> {
     let as_limits = PlaceLimits {
         mean: (rest.uptake.iter())
             .map(|uptake| uptake.filter(|uptake| *uptake > 0.0))
             .collect(),
-        sd: vec![Some(DIFFERENCE_SD_POINTS / 100.0 * reference); rest.uptake.len()],
+        sd: vec![Some(noise.points / 100.0 * reference); rest.uptake.len()],
         // The pattern of one heart is the same in both scans.
         covariance: TermMatrix::zeros(),
     };

@@ -2,9 +2,10 @@
 //!
 //! In: two maps. Out: the angle at which they differ least, or 0 where no other angle is significantly better: the
 //! posture that both were named by is the better guess as long as the images do not contradict it. A difference
-//! counts up to [`CAP_SD`] deviations, so that a defect in one of them does not decide.
+//! counts up to [`CAP_SD`] deviations of a usual pair, so that a defect in one of them does not decide.
 
-use super::calibration::{DIFFERENCE_SD_POINTS, SIGNIFICANT_TURN_GAIN};
+use super::calibration::SIGNIFICANT_TURN_GAIN;
+use super::noise::Noise;
 use super::scale::{Sides, matched};
 use crate::heart::model::wall::{RAY_COLUMNS, RAY_ROWS};
 use crate::heart::normals::ScanPlaces;
@@ -64,7 +65,7 @@ fn mean_square(sides: &Sides<'_>, rest: &ScanPlaces, degrees: f64) -> f64 {
         uptake: turned(sides.stress, degrees),
         ..rest.clone()
     };
-    let Some(scale) = matched(&stress, rest, sides.rest.reference) else {
+    let Some(scale) = matched(&stress, rest, sides.rest.reference, Noise::USUAL) else {
         return f64::INFINITY;
     };
     let (mut sum, mut area) = (0.0, 0.0);
@@ -73,7 +74,7 @@ fn mean_square(sides: &Sides<'_>, rest: &ScanPlaces, degrees: f64) -> f64 {
             continue;
         };
         let points = 100.0 * (at_rest - at_stress / scale.counts) / sides.rest.reference;
-        sum += own * points.abs().min(CAP_SD * DIFFERENCE_SD_POINTS).powi(2);
+        sum += own * points.abs().min(CAP_SD * Noise::USUAL.points).powi(2);
         area += own;
     }
     sum / area

@@ -23,6 +23,8 @@ pub const FIGURES: &[Figure] = &[
         "Transient ischaemic dilation: the ratio of the cavities in the images of all gates.",
     )
     .short("TID")
+    .within("tid_interval")
+    .answered("tid_verdict")
     .coded(
         Group::Whole,
         sct(
@@ -35,9 +37,11 @@ pub const FIGURES: &[Figure] = &[
         "Reversible",
         Unit::PERCENT,
         0,
-        "Share of the wall that loses uptake at stress.",
+        "Share of the wall that loses uptake at stress, as far as half of the depth of the loss.",
     )
     .short("reversible")
+    .within("reversible_interval_percent")
+    .answered("reversible_verdict")
     .coded(Group::Whole, REVERSIBLE_SHARE),
     figure(
         "fixed_percent",
@@ -47,7 +51,45 @@ pub const FIGURES: &[Figure] = &[
         "Share of the wall below the threshold in both scans.",
     )
     .short("fixed")
+    .within("fixed_interval_percent")
+    .answered("fixed_verdict")
     .coded(Group::Whole, FIXED_SHARE),
+    figure(
+        "reverse_percent",
+        "Reverse redistribution",
+        Unit::PERCENT,
+        0,
+        "Share of the wall that lacks uptake at rest beside stress.",
+    )
+    .within("reverse_interval_percent")
+    .answered("reverse_verdict")
+    .detail()
+    .coded(
+        Group::Whole,
+        own("REVERSE", "Share that lacks uptake at rest beside stress"),
+    ),
+    figure(
+        "lost_percent",
+        "Uptake lost at stress",
+        Unit::PERCENT,
+        1,
+        "What stress lacks in the regions that lose uptake, in per cent of the whole wall's uptake at rest.",
+    )
+    .coded(
+        Group::Whole,
+        own("LOST", "Uptake lost at stress, share of the wall's uptake at rest"),
+    ),
+    figure(
+        "detectable_percent",
+        "Least loss that would show",
+        Unit::PERCENT,
+        0,
+        "The least loss of a territory that is found in nine of ten pairs with this noise.",
+    )
+    .coded(
+        Group::Whole,
+        own("DETECTABLE", "Least loss of a territory that is found nine times in ten"),
+    ),
     figure(
         "sss",
         "SSS, summed stress score",
@@ -56,6 +98,8 @@ pub const FIGURES: &[Figure] = &[
         "Sum of the segments' scores at stress.",
     )
     .short("SSS")
+    .within("sss_interval")
+    .answered("sss_verdict")
     .coded(Group::Stress, STRESS_SCORE),
     figure(
         "srs",
@@ -65,6 +109,8 @@ pub const FIGURES: &[Figure] = &[
         "Sum of the segments' scores at rest.",
     )
     .short("SRS")
+    .within("srs_interval")
+    .answered("srs_verdict")
     .coded(Group::Rest, REST_SCORE),
     figure(
         "sds",
@@ -74,6 +120,8 @@ pub const FIGURES: &[Figure] = &[
         "What the segments' scores at stress exceed those at rest by.",
     )
     .short("SDS")
+    .within("sds_interval")
+    .answered("sds_verdict")
     .coded(Group::Whole, loinc("82644-6", "Summed difference score")),
     figure(
         "beat/stress_ef_percent",
@@ -176,10 +224,23 @@ pub const FIGURES: &[Figure] = &[
         "Loss that counts as reversible",
         Unit::POINT,
         0,
-        "2.5 standard deviations of the difference of two scans of an unchanged heart.",
+        "The least loss in smoothed maps that the noise of this pair does not explain.",
     )
     .under(MATCHED)
     .detail(),
+    figure(
+        "noise_points",
+        "Noise of the difference",
+        Unit::POINT,
+        1,
+        "Standard deviation of the smoothed difference by the noise of both scans.",
+    )
+    .under(MATCHED)
+    .detail()
+    .coded(
+        Group::Whole,
+        own("NOISE", "Standard deviation of the difference by noise"),
+    ),
     figure(
         "turn_degrees",
         "Stress map turned by",
@@ -228,6 +289,8 @@ pub const SCAN_FIGURES: &[Figure] = &[
         0,
         "Share of the wall below the normal limit.",
     )
+    .within("extent_interval_percent")
+    .answered("extent_verdict")
     .coded(Group::Whole, DEFECT_EXTENT),
     figure(
         "polar/extent_percent",
@@ -245,6 +308,8 @@ pub const SCAN_FIGURES: &[Figure] = &[
         1,
         "Mean score of the wall, in per cent of the greatest.",
     )
+    .within("deficit_interval_percent")
+    .answered("deficit_verdict")
     .coded(Group::Whole, DEFICIT_SCORE),
 ];
 

@@ -18,6 +18,7 @@ mod unit;
 pub use crate::image::draw::document::HeadlineFigure;
 pub use unit::Unit;
 
+use crate::heart::comparison::Verdict;
 use crate::image::draw::table::{Table, TableColumn};
 use crate::image::draw::text::{number, signed};
 use serde::Serialize;
@@ -43,6 +44,8 @@ pub struct Figure {
     pub signed: bool,
     /// The place of the interval that holds the true figure of nine of ten hearts.
     pub interval: Option<&'static str>,
+    /// The place of what may be said of it: `yes`, `no` or `cannot_tell`.
+    pub verdict: Option<&'static str>,
     /// The heading that it stands under; empty for the main figures.
     pub section: &'static str,
     /// Whether it is among those that a report begins with.
@@ -113,6 +116,7 @@ pub const fn figure(
         digits,
         signed: false,
         interval: None,
+        verdict: None,
         section: "",
         headline: true,
         needs: None,
@@ -136,6 +140,11 @@ impl Figure {
 
     const fn within(mut self, interval: &'static str) -> Self {
         self.interval = Some(interval);
+        self
+    }
+
+    const fn answered(mut self, verdict: &'static str) -> Self {
+        self.verdict = Some(verdict);
         self
     }
 
@@ -207,6 +216,13 @@ impl Figure {
         Some([ends.get(0)?.as_f64()?, ends.get(1)?.as_f64()?])
     }
 
+    /// What may be said of the figure of `report`, in words.
+    pub fn verdict(&self, report: &Value) -> Option<&'static str> {
+        let name = at(report, self.verdict?)?;
+        let verdict: Verdict = serde_json::from_value(name.clone()).ok()?;
+        Some(verdict.as_str())
+    }
+
     /// `value` with the digits of the figure, without its unit.
     pub fn written(&self, value: f64) -> String {
         if self.signed {
@@ -234,6 +250,10 @@ impl Figure {
             }
             None => self.label.to_owned(),
         };
+        let label = match self.verdict(report) {
+            Some(verdict) => format!("{label}; {verdict}"),
+            None => label,
+        };
         let unit = self.unit.symbol;
         Some(HeadlineFigure { value, unit, label })
     }
@@ -254,6 +274,7 @@ impl Figure {
                 Some(self.section).filter(|name| !name.is_empty()),
             ),
             ("interval", self.interval),
+            ("verdict", self.verdict),
             ("needs", self.needs),
             ("unless", self.unless.or(self.not_shown_beside)),
             ("flat_name", self.flat_name),

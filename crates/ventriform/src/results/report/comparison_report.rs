@@ -8,7 +8,7 @@ use super::json_number::round;
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::Resolution;
-use crate::heart::comparison::{PartFigures, WhichScan};
+use crate::heart::comparison::{PartFigures, Verdict, WhichScan};
 use crate::heart::polar::PolarSummary;
 use crate::image::grid::gates::GATE_COUNTS;
 use serde::{Deserialize, Serialize};
@@ -20,20 +20,56 @@ use serde_json::{Map, Value};
 pub struct ComparisonReport {
     /// Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
     pub tid: f64,
+    /// The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs.
+    pub tid_interval: [f64; 2],
+    /// Whether the cavity is larger at stress.
+    pub tid_verdict: Verdict,
     /// Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
     pub sss: Option<u32>,
+    /// Its interval by noise, 5th and 95th percentile.
+    pub sss_interval: Option<[f64; 2]>,
+    /// Whether it is abnormal.
+    pub sss_verdict: Option<Verdict>,
     /// Summed rest score.
     pub srs: Option<u32>,
+    /// Its interval by noise, 5th and 95th percentile.
+    pub srs_interval: Option<[f64; 2]>,
+    /// Whether it is abnormal.
+    pub srs_verdict: Option<Verdict>,
     /// Summed difference score: what the segments' scores at stress exceed those at rest by.
     pub sds: Option<u32>,
+    /// Its interval by noise, 5th and 95th percentile.
+    pub sds_interval: Option<[f64; 2]>,
+    /// Whether it is abnormal.
+    pub sds_verdict: Option<Verdict>,
     /// The summed scores in per cent of 68, in that order.
     pub summed_percent: Option<[f64; 3]>,
-    /// Share of the wall that loses more than `reversible_points` at stress.
+    /// Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss.
     pub reversible_percent: f64,
-    /// Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two scans of an unchanged heart.
+    /// Its interval by noise: 5th and 95th percentile, as for the others.
+    pub reversible_interval_percent: [f64; 2],
+    /// Whether wall loses uptake at stress.
+    pub reversible_verdict: Verdict,
+    /// Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count.
     pub reversible_points: f64,
+    /// What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest.
+    pub lost_percent: f64,
     /// Share of the wall below the threshold in both scans.
     pub fixed_percent: f64,
+    /// Its interval.
+    pub fixed_interval_percent: [f64; 2],
+    /// Whether there is such wall.
+    pub fixed_verdict: Verdict,
+    /// Share of the wall that lacks uptake at rest beside stress (reverse redistribution).
+    pub reverse_percent: f64,
+    /// Its interval.
+    pub reverse_interval_percent: [f64; 2],
+    /// Whether there is such wall.
+    pub reverse_verdict: Verdict,
+    /// Standard deviation of the smoothed difference by the noise of this pair, points.
+    pub noise_points: f64,
+    /// The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a territory.
+    pub detectable_percent: f64,
     /// Counts of the stress scan that are one count of the rest scan where nothing changed.
     pub scale: f64,
     /// Share of the wall by which stress was scaled.
@@ -222,6 +258,15 @@ pub struct ComparedScan {
     pub polar: Option<PolarSummary>,
     /// The wall's uptake beside normal limits, if some were given.
     pub perfusion: Option<PerfusionReport>,
+    /// The interval of the share below the limit by noise, 5th and 95th percentile; `null` unless both scans have limits,
+    /// as for the others.
+    pub extent_interval_percent: Option<[f64; 2]>,
+    /// Whether a twentieth of the wall or more is below the limit.
+    pub extent_verdict: Option<Verdict>,
+    /// The interval of the deficit score.
+    pub deficit_interval_percent: Option<[f64; 2]>,
+    /// Whether it is 5 per cent or more.
+    pub deficit_verdict: Option<Verdict>,
     /// The file.
     pub input: FileFacts,
     /// Warnings about the file.
@@ -270,7 +315,11 @@ pub(crate) mod tests {
             .map(|number| of("segment", &number.to_string()))
             .collect();
         serde_json::from_value(json!({
-            "tid": 1.125, "reversible_percent": 12.5, "reversible_points": 12.25, "fixed_percent": 0.0, "scale": 2.0,
+            "tid": 1.125, "tid_interval": [1.0, 1.25], "tid_verdict": "cannot_tell", "reversible_percent": 12.5,
+            "reversible_interval_percent": [9.0, 16.5], "reversible_verdict": "yes", "reversible_points": 18.5,
+            "lost_percent": 4.25, "fixed_percent": 0.0, "fixed_interval_percent": [0.0, 1.5], "fixed_verdict": "no",
+            "reverse_percent": 0.0, "reverse_interval_percent": [0.0, 4.0], "reverse_verdict": "no",
+            "noise_points": 4.75, "detectable_percent": 19.0, "scale": 2.0,
             "matched_percent": 70.0, "compared_percent": 95.0, "turn_degrees": 0.0, "correlation": 0.9,
             "segments": segments, "territories": [of("name", "\"LAD\"")],
             "no_beat": [],

@@ -4,9 +4,9 @@ use super::error::ComparisonError;
 use super::hearts::ComparedHeart;
 use super::order::ComparisonOrder;
 use crate::base::progress::Monitor;
-use crate::heart::comparison::Change;
-use crate::heart::comparison::MOST_MUSCLE_QUOTIENT;
-use crate::heart::comparison::{ComparisonFlag, Reason, WhichScan};
+use crate::heart::comparison::{
+    Change, ComparisonFlag, FEW_COUNTS_LOSS_PERCENT, MOST_MUSCLE_QUOTIENT, Reason, WhichScan,
+};
 use crate::heart::normals::Perfusion;
 use crate::image::volume::{
     Provenance, ReadLimits, ReadOptions, VolumeFile, hold_same_voxels, provenance,
@@ -149,10 +149,13 @@ pub(super) fn flags(
             rest_ml,
         }));
     }
-    if change.reversible_percent > LARGE_REVERSIBLE_PERCENT {
-        flags.push(ComparisonFlag::TidUncertain {
-            reversible_percent: change.reversible_percent,
-        });
+    let reversible_percent = change.answers.reversible.value;
+    if reversible_percent > LARGE_REVERSIBLE_PERCENT {
+        flags.push(ComparisonFlag::TidUncertain { reversible_percent });
+    }
+    let detectable_percent = change.answers.detectable_percent;
+    if detectable_percent > FEW_COUNTS_LOSS_PERCENT {
+        flags.push(ComparisonFlag::FewCounts { detectable_percent });
     }
     if change.matched_percent < FEW_MATCHED_PERCENT {
         flags.push(ComparisonFlag::ScaleUncertain {

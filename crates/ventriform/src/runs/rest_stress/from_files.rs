@@ -5,8 +5,7 @@ use super::error::ComparisonError;
 use super::hearts::{ComparedHeart, ComparedHearts};
 use super::order::ComparisonOrder;
 use crate::base::progress::Monitor;
-use crate::heart::comparison::WhichScan;
-use crate::heart::comparison::{Change, Sides};
+use crate::heart::comparison::{Change, ScoreAnswers, Sides, WhichScan};
 use crate::heart::normals::ScanKind;
 use crate::image::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
 use crate::parameters::{BeatChoice, FitParameters};
@@ -57,12 +56,15 @@ pub fn from_files(
         rest: rest.map().ok_or(none(WhichScan::Rest))?,
     };
     let change = Change::between(&sides).ok_or(ComparisonError::NothingInCommon)?;
+    let scores = (stress.perfusion().zip(rest.perfusion()))
+        .map(|(stress, rest)| ScoreAnswers::new([stress, rest], &sides, &change));
     Ok(ComparedHearts {
         flags: checks::flags(&stress, &rest, &change),
         stress,
         rest,
         gates,
         change,
+        scores,
         parameters: order.parameters.fit.clone(),
         choice: order.parameters.choice.clone(),
     })

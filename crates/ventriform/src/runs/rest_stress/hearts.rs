@@ -1,7 +1,7 @@
 //! The two hearts of a comparison, each with the work that was made of its scan.
 
 use crate::base::progress::{Cancelled, Monitor};
-use crate::heart::comparison::{Change, ComparisonFlag, WhichScan};
+use crate::heart::comparison::{Answer, Change, ComparisonFlag, ScoreAnswers, WhichScan};
 use crate::heart::normals::Perfusion;
 use crate::heart::polar::PolarMap;
 use crate::image::volume::{HeldGates, Provenance, Volume, VolumeFacts};
@@ -160,6 +160,8 @@ pub struct ComparedHearts {
     pub gates: [HeldGates; 2],
     /// The change of the wall's uptake.
     pub change: Change,
+    /// The scores beside normal limits, if both scans have them.
+    pub scores: Option<ScoreAnswers>,
     /// Reasons to look closer.
     pub flags: Vec<ComparisonFlag>,
     /// The parameters of both fits.
@@ -172,5 +174,10 @@ impl ComparedHearts {
     /// The ratio of the cavities, stress to rest (transient ischaemic dilation).
     pub fn tid(&self) -> f64 {
         self.stress.cavity_ml() / self.rest.cavity_ml()
+    }
+
+    /// The same with the interval that noise gives it.
+    pub fn tid_answer(&self) -> Answer {
+        Answer::of_tid(self.tid(), self.change.noise.points)
     }
 }

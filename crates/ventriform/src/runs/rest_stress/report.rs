@@ -2,7 +2,7 @@
 
 use super::hearts::{ComparedHeart, ComparedHearts};
 use crate::base::numeric::decimals::round;
-use crate::heart::comparison::{REVERSIBLE_POINTS, WhichScan};
+use crate::heart::comparison::{Answer, WhichScan};
 use crate::heart::normals::{Perfusion, summed_percent};
 use crate::heart::polar::{PolarMap, PolarSummary};
 use crate::image::volume::{HeldGates, Provenance};
@@ -17,8 +17,8 @@ fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
     perfusion?.segments[segment - 1].score
 }
 
-/// The report's part about one of both scans.
-fn scan_report(heart: &ComparedHeart) -> ComparedScan {
+/// The report's part about one of both scans; `scores` are its extent and its deficit score.
+fn scan_report(heart: &ComparedHeart, scores: Option<[Answer; 2]>) -> ComparedScan {
     let segmentation = heart.segmentation();
     let model = &segmentation.fit.model;
     let scan = heart.provenance();
@@ -43,6 +43,10 @@ fn scan_report(heart: &ComparedHeart) -> ComparedScan {
         polar: heart.map().map(PolarSummary::from_map),
         perfusion: (heart.perfusion().zip(heart.map()))
             .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
+        extent_interval_percent: scores.map(|[extent, _]| extent.interval.map(round)),
+        extent_verdict: scores.map(|[extent, _]| extent.verdict),
+        deficit_interval_percent: scores.map(|[_, deficit]| deficit.interval.map(round)),
+        deficit_verdict: scores.map(|[_, deficit]| deficit.verdict),
         input: FileFacts::from_facts(facts),
         warnings: facts.warnings.clone(),
     }
@@ -74,6 +78,8 @@ pub(super) fn comparison_report(
     parameters: Map<String, Value>,
 ) -> ComparisonReport {
     let change = &hearts.change;
+    let (answers, tid) = (&change.answers, hearts.tid_answer());
+    let ends = |answer: &Answer| answer.interval.map(round);
     let beats = hearts.stress.beat().zip(hearts.rest.beat());
     let beats = beats.map(|(stress, rest)| [stress.report(), rest.report()]);
     let map = hearts.rest.map();
@@ -96,27 +102,39 @@ pub(super) fn comparison_report(
         motion_change_mm: motion(own.segment).map(|change| round(change.0)),
         thickening_change_points: motion(own.segment).map(|change| round(change.1)),
     });
-    let summed = (hearts.stress.perfusion().zip(hearts.rest.perfusion())).map(|(stress, rest)| {
-        let scores = |perfusion: &Perfusion| perfusion.segments.map(|own| own.score);
-        let pairs = scores(stress).into_iter().zip(scores(rest));
-        let more = pairs.filter_map(|(stress, rest)| Some(stress?.saturating_sub(rest?)));
-        [
-            stress.summed_score,
-            rest.summed_score,
-            more.map(u32::from).sum(),
-        ]
-    });
+    let scores = hearts.scores.as_ref();
+    let sum = |answer: Answer| answer.value as u32;
+    let summed = scores.map(|own| [own.sss, own.srs, own.sds].map(sum));
+    let of_scan = |scan: usize| scores.map(|own| [own.extent[scan], own.deficit[scan]]);
     let oriented = map.is_some_and(PolarMap::is_oriented);
     let territories = change.territories.iter().filter(|_| oriented);
     ComparisonReport {
         tid: round(hearts.tid()),
-        sss: summed.map(|[sss, _, _]| sss),
-        srs: summed.map(|[_, srs, _]| srs),
-        sds: summed.map(|[_, _, sds]| sds),
+        tid_interval: ends(&tid),
+        tid_verdict: tid.verdict,
+        sss: scores.map(|own| sum(own.sss)),
+        sss_interval: scores.map(|own| ends(&own.sss)),
+        sss_verdict: scores.map(|own| own.sss.verdict),
+        srs: scores.map(|own| sum(own.srs)),
+        srs_interval: scores.map(|own| ends(&own.srs)),
+        srs_verdict: scores.map(|own| own.srs.verdict),
+        sds: scores.map(|own| sum(own.sds)),
+        sds_interval: scores.map(|own| ends(&own.sds)),
+        sds_verdict: scores.map(|own| own.sds.verdict),
         summed_percent: summed.map(|sums| sums.map(|sum| round(summed_percent(sum)))),
-        reversible_percent: round(change.reversible_percent),
-        reversible_points: REVERSIBLE_POINTS,
-        fixed_percent: round(change.fixed_percent),
+        reversible_percent: round(answers.reversible.value),
+        reversible_interval_percent: ends(&answers.reversible),
+        reversible_verdict: answers.reversible.verdict,
+        reversible_points: round(change.limit_points()),
+        lost_percent: round(change.lost_percent),
+        fixed_percent: round(answers.fixed.value),
+        fixed_interval_percent: ends(&answers.fixed),
+        fixed_verdict: answers.fixed.verdict,
+        reverse_percent: round(answers.reverse.value),
+        reverse_interval_percent: ends(&answers.reverse),
+        reverse_verdict: answers.reverse.verdict,
+        noise_points: round(change.noise.points),
+        detectable_percent: round(answers.detectable_percent),
         scale: round(change.scale),
         matched_percent: round(change.matched_percent),
         compared_percent: round(change.compared_percent),
@@ -142,8 +160,8 @@ pub(super) fn comparison_report(
             rest_esv_ml: rest.esv_ml,
         }),
         no_beat: no_beat(hearts),
-        stress: scan_report(&hearts.stress),
-        rest: scan_report(&hearts.rest),
+        stress: scan_report(&hearts.stress, of_scan(0)),
+        rest: scan_report(&hearts.rest, of_scan(1)),
         flags: (hearts.flags.iter())
             .map(|flag| RaisedFlag::new(flag.code(), flag))
             .collect(),
