@@ -5,6 +5,8 @@
     calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and
                                             writes
                                             crates/ventriform/src/heart/comparison/calibration.rs
+    calibrate_comparison.py --write --halves TABLE
+                                            the same with those that come from halves of a real scan
 
 A table is what the program `comparisons` prints; calibrate_all.py makes it. The committed one has 20 pairs of an older
 simulator with the same kinds. By itself:
@@ -12,7 +14,14 @@ simulator with the same kinds. By itself:
     cargo run --release -p ventriform-evaluation --bin simulate -- pairs --out PAIRS --seed 610 --n 20 --gates 0
     cargo run --release -p ventriform-evaluation --bin comparisons -- PAIRS/* > TABLE
 
-- Deviation of the difference: root mean square over the pairs without reversible wall.
+Halves of a real scan are such a table too: each half in the place of one scan, with a pair.json of the kind `half`.
+Their table is no part of the tree; without it, the constants that come from it stay as they are.
+
+- Noise of a usual pair: root mean square of the difference over the pairs without reversible wall; its rows' shares
+  likewise. What smoothing leaves for one point of what it takes away: the quotient of both root mean squares.
+- Limit of a loss (halves): the deviations of noise that the greatest difference exceeds in one of twenty pairs.
+- TID (halves): deviation of its logarithm for a point of noise; what is not noise counts as OTHER_NOISE_POINTS of it.
+- Error of a changed share: its root mean square over the pairs with reversible wall that was found, as a share of it.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
   down again.
 - Quotient of the walls: four deviations of its logarithm.
@@ -21,6 +30,7 @@ simulator with the same kinds. By itself:
 import argparse
 import csv
 import pathlib
+import re
 
 import numpy as np
 
@@ -29,10 +39,12 @@ TABLE = ROOT / "scripts/measure/calibration/comparisons.csv"
 CONSTANTS = ROOT / "crates/ventriform/src/heart/comparison/calibration.rs"
 FOUND_PERCENT = 3
 TURN_MARGIN, MUSCLE_SDS = 2.5, 4
+LIMIT_SHARE, OTHER_NOISE_POINTS = 0.95, 4
 HEADER = """\
 //! Constants of comparisons. Written by `scripts/measure/calibrate_comparison.py`: do not edit.
 //!
-//! In: comparisons of simulated pairs of scans, and what truly changed. Out: how much unchanged hearts differ.
+//! In: comparisons of simulated pairs of scans and of halves of a real one, and what truly changed. Out: how much
+//! unchanged hearts differ.
 """
 
 
@@ -49,19 +61,81 @@ def without_reversible(rows):
     return [row for row in rows if float(row["true_reversible"]) == 0]
 
 
-def write():
+def root_mean_square(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def known(name):
+    """The constant as it stands."""
+    return float(re.search(rf"{name}: f64 = ([\d.]+);", CONSTANTS.read_text())[1])
+
+
+def of_halves(table):
+    """Limit, TID's deviation without noise, and for each point of noise."""
+    if table is None:
+        return [known(name) for name in ("LIMIT_SDS", "TID_SD", "TID_SD_PER_POINT")]
+    rows = rows_of(table)
+    noise = np.hypot(column(rows, "noise_points"), OTHER_NOISE_POINTS)
+    per_point = root_mean_square(np.log(column(rows, "tid")) / noise)
+    limit = np.quantile(column(rows, "largest_sds"), LIMIT_SHARE)
+    return [limit, OTHER_NOISE_POINTS * per_point, per_point]
+
+
+def write(halves):
     rows = rows_of(TABLE)
     unchanged = without_reversible(rows)
-    sd = np.sqrt(np.mean(column(unchanged, "sd_points") ** 2))
+    usual = root_mean_square(column(unchanged, "sd_points"))
+    thirds = [root_mean_square(column(unchanged, f"sd_{part}")) / usual for part in ("apical", "middle", "basal")]
+    fine = root_mean_square(column(unchanged, "smooth_points")) / root_mean_square(column(unchanged, "fine_points"))
+    limit, tid_sd, tid_per_point = of_halves(halves)
+    found = [row for row in rows if float(row["true_reversible"]) > 0 and float(row["reversible"]) > FOUND_PERCENT]
+    border = root_mean_square(1 - column(found, "true_reversible") / column(found, "reversible"))
     gain = TURN_MARGIN * column(unchanged, "turn_gain").max()
-    muscle = np.exp(MUSCLE_SDS * np.sqrt(np.mean(np.log(column(rows, "muscle")) ** 2)))
+    muscle = np.exp(MUSCLE_SDS * root_mean_square(np.log(column(rows, "muscle"))))
     constants = [
         (
-            "pub const DIFFERENCE_SD_POINTS",
-            sd,
+            "pub(super) const USUAL_NOISE_POINTS",
+            usual,
             1,
-            "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's "
-            "reference.",
+            "Standard deviation of the smoothed difference of a usual pair where nothing changed, per cent of the rest "
+            "map's reference.",
+        ),
+        (
+            "pub(super) const SMOOTH_PER_FINE_NOISE",
+            fine,
+            2,
+            "Noise of the smoothed difference for one point of what smoothing takes away.",
+        ),
+        (
+            "pub(super) const ROW_NOISE_SHARES",
+            thirds,
+            2,
+            "Noise in the apical, the middle and the basal rows of a map, as shares of that of the wall.",
+        ),
+        (
+            "pub(super) const LIMIT_SDS",
+            limit,
+            1,
+            "Standard deviations of noise that the greatest difference of an unchanged heart exceeds in one of twenty "
+            "pairs.",
+        ),
+        (
+            "pub(super) const BORDER_SD_SHARE",
+            border,
+            2,
+            "Standard deviation of the share of the wall that is found to have changed, as a share of it.",
+        ),
+        (
+            "pub(super) const TID_SD",
+            tid_sd,
+            3,
+            "Standard deviation of the logarithm of TID without noise.",
+        ),
+        (
+            "pub(super) const TID_SD_PER_POINT",
+            tid_per_point,
+            4,
+            "Standard deviation of the logarithm of TID for each point of noise.",
         ),
         (
             "pub(super) const SIGNIFICANT_TURN_GAIN",
@@ -78,8 +152,10 @@ def write():
     ]
     text = HEADER
     for name, value, places, says in constants:
-        text += f"\n/// {says}\n{name}: f64 = {round(float(value), places)};\n"
-        print(name.split()[-1], f"{value:.3f}")
+        rounded = np.round(np.asarray(value, float), places).tolist()
+        kind = "f64" if np.isscalar(rounded) else f"[f64; {len(rounded)}]"
+        text += f"\n/// {says}\n{name}: {kind} = {rounded};\n"
+        print(name.split()[-1], rounded)
     CONSTANTS.write_text(text)
 
 
@@ -98,11 +174,22 @@ def check(table):
         f"unchanged: {len(unchanged)} pairs, largest reversible share {column(unchanged, 'reversible').max():.1f} "
         f"per cent"
     )
+    low, high = (column(rows, f"reversible_{end}") for end in ("low", "high"))
+    truth = column(rows, "true_reversible")
+    print(f"interval of the reversible share holds the truth in {np.mean((low <= truth) & (truth <= high)):.0%}")
+    for verdict in ("yes", "no", "cannot_tell"):
+        own = [row for row in rows if row["verdict"] == verdict]
+        changed = len(own) - len(without_reversible(own))
+        print(f"{verdict}: {len(own)} pairs, changed {changed}")
     for strength in (20, 40, 60):
         own = [row for row in rows if row["kind"].endswith(str(strength))]
         found = [row for row in own if float(row["reversible"]) > FOUND_PERCENT]
         right = [row for row in found if row["territory"] == row["true_territory"]]
-        print(f"reversible {strength} per cent: {len(own)}, found {len(found)}, territory right {len(right)}")
+        error = column(own, "reversible") - column(own, "true_reversible")
+        print(
+            f"reversible {strength} per cent: {len(own)}, found {len(found)}, territory right {len(right)}, "
+            f"share less truth {error.mean():+.1f}, worst {abs(error).max(initial=0):.1f}"
+        )
 
 
 def main():
@@ -110,8 +197,9 @@ def main():
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--check", metavar="TABLE", nargs="?", const=TABLE)
     what.add_argument("--write", action="store_true")
+    parser.add_argument("--halves", metavar="TABLE", help="comparisons of halves of a real scan")
     arguments = parser.parse_args()
-    write() if arguments.write else check(arguments.check)
+    write(arguments.halves) if arguments.write else check(arguments.check)
 
 
 if __name__ == "__main__":
