@@ -14,6 +14,7 @@ export interface Figure {
   short?: string;
   section?: string;
   interval?: string;
+  verdict?: string;
   needs?: string;
   unless?: string;
   flat_name?: string;
@@ -50,6 +51,12 @@ export function written({ digits, signed, unit }: Figure, value: number | undefi
 export function intervalOf(row: Figure, report: unknown): string {
   const ends = row.interval ? at(report, row.interval) : null;
   return Array.isArray(ends) ? `${number(ends[0], row.digits)} to ${number(ends[1], row.digits)}` : "";
+}
+
+/** What may be said of the figure: yes, no or cannot tell. */
+export function verdictOf(row: Figure, report: unknown): string {
+  const verdict = row.verdict ? at(report, row.verdict) : null;
+  return typeof verdict === "string" ? verdict.replaceAll("_", " ") : "";
 }
 
 const headOf = ({ label, short, unit }: Figure) => `${short ?? label}${unit && `, ${unit}`}`;

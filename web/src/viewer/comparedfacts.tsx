@@ -1,7 +1,7 @@
 // What a comparison says in figures and words.
 
 import type { ComponentChildren } from "preact";
-import { BesideTable, PartTable, flatName, rowsOf, figureOf, written } from "../figures";
+import { BesideTable, PartTable, figureOf, flatName, intervalOf, rowsOf, verdictOf, written } from "../figures";
 import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
 import { Simulated } from "../limits";
 import { number } from "../words";
@@ -12,7 +12,13 @@ export function headlinesOf(report: ComparisonReport): [string, string, string][
   const beside = besideHeadlines(report);
   return rowsOf("ComparisonReport")
     .filter(row => row.short && figureOf(row, report) !== undefined)
-    .map(row => [capital(row.short!), written(row, figureOf(row, report)), beside[row.place] ?? ""]);
+    .map(row => [
+      capital(row.short!),
+      written(row, figureOf(row, report)),
+      [beside[row.place], intervalOf(row, report) && `90 %: ${intervalOf(row, report)}`, verdictOf(row, report)]
+        .filter(Boolean)
+        .join("; "),
+    ]);
 }
 
 const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
