@@ -18,10 +18,11 @@ Halves of a real scan are such a table too: each half in the place of one scan, 
 Their table is no part of the tree; without it, the constants that come from it stay as they are.
 
 - Noise of a usual pair: root mean square of the difference over the pairs without reversible wall; its rows' shares
-  likewise. What smoothing leaves for one point of what it takes away: the quotient of both root mean squares.
+  likewise, over these and the halves. What smoothing leaves for one point of what it takes away: the quotient of both root mean squares.
 - Limit of a loss (halves): the deviations of noise that the greatest difference exceeds in one of twenty pairs.
 - TID (halves): deviation of its logarithm for a point of noise; what is not noise counts as OTHER_NOISE_POINTS of it.
-- Error of a changed share: its root mean square over the pairs with reversible wall that was found, as a share of it.
+- Error of a changed share: its root mean square over the pairs that lost 40 or 60 per cent and were found, as a
+  share of it.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
   down again.
 - Quotient of the walls: four deviations of its logarithm.
@@ -84,11 +85,13 @@ def of_halves(table):
 def write(halves):
     rows = rows_of(TABLE)
     unchanged = without_reversible(rows)
+    like = unchanged + (rows_of(halves) if halves else [])
     usual = root_mean_square(column(unchanged, "sd_points"))
-    thirds = [root_mean_square(column(unchanged, f"sd_{part}")) / usual for part in ("apical", "middle", "basal")]
-    fine = root_mean_square(column(unchanged, "smooth_points")) / root_mean_square(column(unchanged, "fine_points"))
+    overall = root_mean_square(column(like, "sd_points"))
+    thirds = [root_mean_square(column(like, f"sd_{part}")) / overall for part in ("apical", "middle", "basal")]
+    fine = root_mean_square(column(like, "smooth_points")) / root_mean_square(column(like, "fine_points"))
     limit, tid_sd, tid_per_point = of_halves(halves)
-    found = [row for row in rows if float(row["true_reversible"]) > 0 and float(row["reversible"]) > FOUND_PERCENT]
+    found = [row for row in rows if row["kind"].endswith(("40", "60")) and float(row["reversible"]) > FOUND_PERCENT]
     border = root_mean_square(1 - column(found, "true_reversible") / column(found, "reversible"))
     gain = TURN_MARGIN * column(unchanged, "turn_gain").max()
     muscle = np.exp(MUSCLE_SDS * root_mean_square(np.log(column(rows, "muscle"))))

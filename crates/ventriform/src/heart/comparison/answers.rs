@@ -274,7 +274,7 @@ mod tests {
             assert!(low < 1.0 && high > 1.0);
             high / low
         };
-        assert!(width(8.0) > 1.2 * width(4.0));
+        assert!(width(8.0) > 1.1 * width(4.0));
         assert_eq!(Answer::of_tid(1.4, 4.0).verdict, Verdict::Yes);
         assert_eq!(Answer::of_tid(1.0, 4.0).verdict, Verdict::No);
         assert_eq!(Answer::of_tid(1.14, 8.0).verdict, Verdict::CannotTell);
