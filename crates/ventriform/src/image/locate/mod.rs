@@ -356,8 +356,11 @@ mod tests {
     fn a_heart_beside_gut_twenty_times_as_hot_is_found_and_none_is_found_without_one() {
         let usual = scan(&small());
         let alone = centres(&usual, &Hints::default()).1;
+        let monitor = Monitor::silent();
         for times in [5.0, 12.0, 20.0] {
-            let found = centres(&beside_gut(usual.clone(), &alone, times), &Hints::default()).1;
+            let beside = beside_gut(usual.clone(), &alone, times);
+            let heart = find(&beside, &Hints::default(), &monitor).unwrap();
+            let found = heart.localisation().unwrap().cup.centre;
             assert!((found - alone).norm() < 6.0, "{times}: {found} {alone}");
             let dark = |segment| PerfusionDefect {
                 segment,
@@ -368,7 +371,6 @@ mod tests {
                 right_ventricle: 0.0,
                 ..small()
             });
-            let monitor = Monitor::silent();
             let erased = beside_gut(erased, &alone, times);
             let heart = find(&erased, &Hints::default(), &monitor).unwrap();
             assert!(heart.localisation().is_err(), "{times}");
