@@ -364,6 +364,14 @@ def check_comparison(program, folder):
     assert states["Left ventricle myocardium at stress"] == "432655005" and states["Segment 7, rest"] == "128975004", (
         states
     )
+    whole = next(g for g in groups if g.tracking_identifier == "Left ventricle myocardium, rest and stress")
+    comments = " ".join(c.value for c in whole[0].ContentSequence if c.name.value == "121106")
+    verdict = report["reversible_verdict"].replace("_", " ")
+    assert f"Reversible: {verdict}" in comments, comments
+    share = next(m for m in whole.get_measurements() if m.name.value == "REVERSIBLE")
+    ends = {c.name.value: float(c.value) for c in share[0].ContentSequence if c.value_type.value == "NUM"}
+    low, high = report["reversible_interval_percent"]
+    assert np.isclose(share.value - ends["371885007"], low) and np.isclose(share.value + ends["371886008"], high), ends
     read = out / "measurements.json"
     subprocess.run(
         [

@@ -5,6 +5,7 @@ use super::comparison_report::ComparisonReport;
 use super::fit_report::FittedVolumes;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
+use crate::heart::comparison::Verdict;
 use crate::heart::normals::{GroupSex, NormalGroup, NormalLimits};
 use crate::heart::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
@@ -141,6 +142,10 @@ pub struct ComparisonSummary {
     pub sds: Option<u32>,
     /// Share of the wall that loses uptake at stress.
     pub reversible_percent: f64,
+    /// Its interval by noise, 5th and 95th percentile; not there in comparisons made before it existed.
+    pub reversible_interval_percent: Option<[f64; 2]>,
+    /// Whether wall loses uptake at stress; not there in the same ones.
+    pub reversible_verdict: Option<Verdict>,
     /// Share of the wall below the threshold in both scans.
     pub fixed_percent: f64,
     /// Change of the ejection fraction from rest to stress, points; `null` unless both scans are gated.
@@ -196,6 +201,8 @@ impl ComparisonSummary {
             srs: report.srs,
             sds: report.sds,
             reversible_percent: report.reversible_percent,
+            reversible_interval_percent: Some(report.reversible_interval_percent),
+            reversible_verdict: Some(report.reversible_verdict),
             fixed_percent: report.fixed_percent,
             ef_change_points: report.beat.and_then(|beat| beat.ef_change_points),
             confidence: report.stress.confidence.min(report.rest.confidence),

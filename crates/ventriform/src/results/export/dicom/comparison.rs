@@ -8,10 +8,12 @@
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one
 //! of each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17
 //! segments in each state, and one of each segment's change. The group of a scan names the limits that its scores stand
-//! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
+//! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores. What
+//! noise lets a figure be is a range of measurement uncertainty; its verdict stands in a comment, for which there is no
+//! code.
 
 use super::normals::{limits_used, patient_state};
-use super::structured_report::{self as sr, WALL_SEGMENTS, measured};
+use super::structured_report::{self as sr, WALL_SEGMENTS, measured, verdicts};
 use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
 use crate::heart::comparison::WhichScan;
 use crate::image::draw::Image;
@@ -95,6 +97,9 @@ impl ComparisonObject {
         }
     }
 }
+
+/// The comment of the group of both scans: no code says how sure a range is.
+const NOISE_COMMENT: &str = "Ranges of measurement uncertainty are the 5th and the 95th percentile by the noise of both scans.";
 
 /// Slices of stress above those of rest.
 const SLICES_PICTURE: &str = "slices.png";
@@ -250,8 +255,10 @@ impl<'a> DicomComparison<'a> {
         let (site, whole) = (self.structure.site, readable(report));
         let mut content = self.beginning(&format!("{label}, rest and stress"), None, site);
         content.extend(measured(&whole, FIGURES, Group::Whole));
-        let flags = report.flags.iter();
-        content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
+        content.extend(verdicts(&whole, FIGURES, Group::Whole));
+        let flags = report.flags.iter().map(|flag| flag.reason.as_str());
+        let comments = [NOISE_COMMENT].into_iter().chain(flags);
+        content.extend(comments.map(|said| text("CONTAINS", dcm("121106", "Comment"), said)));
         let mut groups = vec![group("1501", content)];
         for (scan, own, state) in [
             (WhichScan::Stress, &report.stress, Group::Stress),
@@ -259,8 +266,11 @@ impl<'a> DicomComparison<'a> {
         ] {
             let name = format!("{label} at {scan}");
             let mut content = self.beginning(&name, Some(scan), site);
-            content.extend(measured(&readable(own), SCAN_FIGURES, Group::Whole));
+            let scores = readable(own);
+            content.extend(measured(&scores, SCAN_FIGURES, Group::Whole));
             content.extend(measured(&whole, FIGURES, state));
+            content.extend(verdicts(&scores, SCAN_FIGURES, Group::Whole));
+            content.extend(verdicts(&whole, FIGURES, state));
             content.extend(own.perfusion.iter().flat_map(limits_used));
             groups.push(group("1501", content));
         }

@@ -200,6 +200,18 @@ pub(super) fn measured(report: &Value, rows: &[Figure], group: Group) -> Vec<Dat
         .collect()
 }
 
+/// What may be said of the figures of `rows` in that group, in one comment; none where nothing is said of any.
+pub(super) fn verdicts(report: &Value, rows: &[Figure], group: Group) -> Option<DataSet> {
+    let said: Vec<String> = (rows.iter())
+        .filter(|row| row.coded.is_some_and(|coded| coded.group == group))
+        .filter_map(|row| Some(format!("{}: {}", row.label, row.verdict(report)?)))
+        .collect();
+    (!said.is_empty()).then(|| {
+        let said = format!("Beyond what noise explains: {}", said.join("; "));
+        text("CONTAINS", dcm("121106", "Comment"), &said)
+    })
+}
+
 fn measurement(report: &Value, row: &Figure, coded: Coded) -> Option<DataSet> {
     let value = row.value(report).filter(|value| value.is_finite())?;
     let unit = row.unit.code;
