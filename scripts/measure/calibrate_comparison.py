@@ -25,7 +25,7 @@ Their table is no part of the tree; without it, the constants that come from it 
   share of it.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
   down again.
-- Quotient of the walls: four deviations of its logarithm.
+- Quotient of the walls: four deviations of its logarithm over these pairs and the halves.
 """
 
 import argparse
@@ -71,15 +71,16 @@ def known(name):
     return float(re.search(rf"{name}: f64 = ([\d.]+);", CONSTANTS.read_text())[1])
 
 
-def of_halves(table):
-    """Limit, TID's deviation without noise, and for each point of noise."""
+def of_halves(table, pairs):
+    """Limit, TID's deviation without noise and for each point of noise, and, with `pairs`, the quotient of the walls."""
     if table is None:
-        return [known(name) for name in ("LIMIT_SDS", "TID_SD", "TID_SD_PER_POINT")]
+        return [known(name) for name in ("LIMIT_SDS", "TID_SD", "TID_SD_PER_POINT", "MOST_MUSCLE_QUOTIENT")]
     rows = rows_of(table)
     noise = np.hypot(column(rows, "noise_points"), OTHER_NOISE_POINTS)
     per_point = root_mean_square(np.log(column(rows, "tid")) / noise)
     limit = np.quantile(column(rows, "largest_sds"), LIMIT_SHARE)
-    return [limit, OTHER_NOISE_POINTS * per_point, per_point]
+    muscle = np.exp(MUSCLE_SDS * root_mean_square(np.log(column(pairs + rows, "muscle"))))
+    return [limit, OTHER_NOISE_POINTS * per_point, per_point, muscle]
 
 
 def write(halves):
@@ -90,11 +91,10 @@ def write(halves):
     overall = root_mean_square(column(like, "sd_points"))
     thirds = [root_mean_square(column(like, f"sd_{part}")) / overall for part in ("apical", "middle", "basal")]
     fine = root_mean_square(column(like, "smooth_points")) / root_mean_square(column(like, "fine_points"))
-    limit, tid_sd, tid_per_point = of_halves(halves)
+    limit, tid_sd, tid_per_point, muscle = of_halves(halves, unchanged)
     found = [row for row in rows if row["kind"].endswith(("40", "60")) and float(row["reversible"]) > FOUND_PERCENT]
     border = root_mean_square(1 - column(found, "true_reversible") / column(found, "reversible"))
     gain = TURN_MARGIN * column(unchanged, "turn_gain").max()
-    muscle = np.exp(MUSCLE_SDS * root_mean_square(np.log(column(rows, "muscle"))))
     constants = [
         (
             "pub(super) const USUAL_NOISE_POINTS",
@@ -186,6 +186,8 @@ def check(table):
         print(f"{verdict}: {len(own)} pairs, changed {changed}")
     for strength in (20, 40, 60):
         own = [row for row in rows if row["kind"].endswith(str(strength))]
+        if not own:
+            continue
         found = [row for row in own if float(row["reversible"]) > FOUND_PERCENT]
         right = [row for row in found if row["territory"] == row["true_territory"]]
         error = column(own, "reversible") - column(own, "true_reversible")

@@ -4,28 +4,28 @@
 //! unchanged hearts differ.
 
 /// Standard deviation of the smoothed difference of a usual pair where nothing changed, per cent of the rest map's reference.
-pub(super) const USUAL_NOISE_POINTS: f64 = 4.9;
+pub(super) const USUAL_NOISE_POINTS: f64 = 5.6;
 
 /// Noise of the smoothed difference for one point of what smoothing takes away.
-pub(super) const SMOOTH_PER_FINE_NOISE: f64 = 1.8;
+pub(super) const SMOOTH_PER_FINE_NOISE: f64 = 1.77;
 
 /// Noise in the apical, the middle and the basal rows of a map, as shares of that of the wall.
-pub(super) const ROW_NOISE_SHARES: [f64; 3] = [1.45, 1.12, 0.9];
+pub(super) const ROW_NOISE_SHARES: [f64; 3] = [1.26, 0.98, 0.81];
 
 /// Standard deviations of noise that the greatest difference of an unchanged heart exceeds in one of twenty pairs.
-pub(super) const LIMIT_SDS: f64 = 3.8;
+pub(super) const LIMIT_SDS: f64 = 3.6;
 
 /// Standard deviation of the share of the wall that is found to have changed, as a share of it.
-pub(super) const BORDER_SD_SHARE: f64 = 0.15;
+pub(super) const BORDER_SD_SHARE: f64 = 0.17;
 
 /// Standard deviation of the logarithm of TID without noise.
 pub(super) const TID_SD: f64 = 0.05;
 
 /// Standard deviation of the logarithm of TID for each point of noise.
-pub(super) const TID_SD_PER_POINT: f64 = 0.0125;
+pub(super) const TID_SD_PER_POINT: f64 = 0.0126;
 
 /// Share by which a turn must lower the mean squared difference.
-pub(super) const SIGNIFICANT_TURN_GAIN: f64 = 0.21;
+pub(super) const SIGNIFICANT_TURN_GAIN: f64 = 0.3;
 
 /// Quotient of the walls' volumes beyond which they are hardly of one heart.
-pub const MOST_MUSCLE_QUOTIENT: f64 = 1.21;
+pub const MOST_MUSCLE_QUOTIENT: f64 = 1.46;
