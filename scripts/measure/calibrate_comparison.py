@@ -1,46 +1,46 @@
 #!/usr/bin/env python3
-"""Estimates how much two scans of an unchanged heart differ, from a table of simulated pairs.
+"""Estimates how much two scans of an unchanged heart differ, from tables of simulated pairs and of real halves.
 
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
     calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and
-                                            writes
+                                            halves.csv beside it, and writes
                                             crates/ventriform/src/heart/comparison/calibration.rs
-    calibrate_comparison.py --write --halves TABLE
-                                            the same with those that come from halves of a real scan
 
-A table is what the program `comparisons` prints; calibrate_all.py makes it. The committed one has 20 pairs of an older
-simulator with the same kinds. By itself:
+A table is what the program `comparisons` prints; calibrate_all.py makes that of the pairs. By itself:
 
     cargo run --release -p ventriform-evaluation --bin simulate -- pairs --out PAIRS --seed 610 --n 20 --gates 0
     cargo run --release -p ventriform-evaluation --bin comparisons -- PAIRS/* > TABLE
 
-Halves of a real scan are such a table too: each half in the place of one scan, with a pair.json of the kind `half`.
-Their table is no part of the tree; without it, the constants that come from it stay as they are.
+Halves are such a table too: the counts of one patient's projections divided in two at random (88 pairs of 2.0 M
+counts each), or drawn twice from the projections of the patient's image (86 pairs of 6.4 M), both reconstructed and
+compared as stress and rest, with a pair.json of the kind `half`. The scan is no part of the tree.
 
 - Noise of a usual pair: root mean square of the difference over the pairs without reversible wall; its rows' shares
-  likewise, over these and the halves. What smoothing leaves for one point of what it takes away: the quotient of both root mean squares.
-- Limit of a loss (halves): the deviations of noise that the greatest difference exceeds in one of twenty pairs.
-- TID (halves): deviation of its logarithm for a point of noise; what is not noise counts as OTHER_NOISE_POINTS of it.
+  likewise, over these and the halves. What smoothing leaves for one point of what it takes away: the quotient of both
+  root mean squares.
+- Limit of a loss (halves): the deviations of noise that the greatest difference exceeds in four of a hundred pairs: so
+  few that one of twenty others hardly does.
+- TID, and the walls' volumes (halves): deviation of the logarithm of their quotient for a point of noise; what is not
+  noise counts as OTHER_NOISE_POINTS of it.
 - Error of a changed share: its root mean square over the pairs that lost 40 or 60 per cent and were found, as a
   share of it.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
   down again.
-- Quotient of the walls: four deviations of its logarithm over these pairs and the halves.
 """
 
 import argparse
 import csv
 import pathlib
-import re
 
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLE = ROOT / "scripts/measure/calibration/comparisons.csv"
+HALVES = ROOT / "scripts/measure/calibration/halves.csv"
 CONSTANTS = ROOT / "crates/ventriform/src/heart/comparison/calibration.rs"
 FOUND_PERCENT = 3
-TURN_MARGIN, MUSCLE_SDS = 2.5, 4
-LIMIT_SHARE, OTHER_NOISE_POINTS = 0.95, 4
+TURN_MARGIN = 2.5
+LIMIT_SHARE, OTHER_NOISE_POINTS = 0.96, 4
 HEADER = """\
 //! Constants of comparisons. Written by `scripts/measure/calibrate_comparison.py`: do not edit.
 //!
@@ -66,32 +66,23 @@ def root_mean_square(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def known(name):
-    """The constant as it stands."""
-    return float(re.search(rf"{name}: f64 = ([\d.]+);", CONSTANTS.read_text())[1])
-
-
-def of_halves(table, pairs):
-    """Limit, TID's deviation without noise and for each point of noise, and, with `pairs`, the quotient of the walls."""
-    if table is None:
-        return [known(name) for name in ("LIMIT_SDS", "TID_SD", "TID_SD_PER_POINT", "MOST_MUSCLE_QUOTIENT")]
-    rows = rows_of(table)
+def of_halves(rows):
+    """Limit; of TID and of the walls' volumes the deviation without noise, and for each point of noise."""
     noise = np.hypot(column(rows, "noise_points"), OTHER_NOISE_POINTS)
-    per_point = root_mean_square(np.log(column(rows, "tid")) / noise)
+    tid, muscle = (root_mean_square(np.log(column(rows, name)) / noise) for name in ("tid", "muscle"))
     limit = np.quantile(column(rows, "largest_sds"), LIMIT_SHARE)
-    muscle = np.exp(MUSCLE_SDS * root_mean_square(np.log(column(pairs + rows, "muscle"))))
-    return [limit, OTHER_NOISE_POINTS * per_point, per_point, muscle]
+    return [limit, OTHER_NOISE_POINTS * tid, tid, OTHER_NOISE_POINTS * muscle, muscle]
 
 
-def write(halves):
-    rows = rows_of(TABLE)
+def write():
+    rows, halves = rows_of(TABLE), rows_of(HALVES)
     unchanged = without_reversible(rows)
-    like = unchanged + (rows_of(halves) if halves else [])
+    like = unchanged + halves
     usual = root_mean_square(column(unchanged, "sd_points"))
     overall = root_mean_square(column(like, "sd_points"))
     thirds = [root_mean_square(column(like, f"sd_{part}")) / overall for part in ("apical", "middle", "basal")]
     fine = root_mean_square(column(like, "smooth_points")) / root_mean_square(column(like, "fine_points"))
-    limit, tid_sd, tid_per_point, muscle = of_halves(halves, unchanged)
+    limit, tid_sd, tid_per_point, muscle_sd, muscle_per_point = of_halves(halves)
     found = [row for row in rows if row["kind"].endswith(("40", "60")) and float(row["reversible"]) > FOUND_PERCENT]
     border = root_mean_square(1 - column(found, "true_reversible") / column(found, "reversible"))
     gain = TURN_MARGIN * column(unchanged, "turn_gain").max()
@@ -119,8 +110,8 @@ def write(halves):
             "pub(super) const LIMIT_SDS",
             limit,
             1,
-            "Standard deviations of noise that the greatest difference of an unchanged heart exceeds in one of twenty "
-            "pairs.",
+            "Standard deviations of noise that the greatest difference of an unchanged heart exceeds in four of a "
+            "hundred pairs.",
         ),
         (
             "pub(super) const BORDER_SD_SHARE",
@@ -147,10 +138,16 @@ def write(halves):
             "Share by which a turn must lower the mean squared difference.",
         ),
         (
-            "pub const MOST_MUSCLE_QUOTIENT",
-            muscle,
-            2,
-            "Quotient of the walls' volumes beyond which they are hardly of one heart.",
+            "pub(super) const MUSCLE_SD",
+            muscle_sd,
+            3,
+            "Standard deviation of the logarithm of the quotient of the walls' volumes without noise.",
+        ),
+        (
+            "pub(super) const MUSCLE_SD_PER_POINT",
+            muscle_per_point,
+            4,
+            "Standard deviation of the logarithm of the quotient of the walls' volumes for each point of noise.",
         ),
     ]
     text = HEADER
@@ -202,9 +199,8 @@ def main():
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--check", metavar="TABLE", nargs="?", const=TABLE)
     what.add_argument("--write", action="store_true")
-    parser.add_argument("--halves", metavar="TABLE", help="comparisons of halves of a real scan")
     arguments = parser.parse_args()
-    write(arguments.halves) if arguments.write else check(arguments.check)
+    write() if arguments.write else check(arguments.check)
 
 
 if __name__ == "__main__":

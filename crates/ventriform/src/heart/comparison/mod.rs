@@ -31,7 +31,6 @@ mod side_by_side;
 mod turn;
 
 pub use answers::{Answer, Answers, FEW_COUNTS_LOSS_PERCENT, Verdict};
-pub use calibration::MOST_MUSCLE_QUOTIENT;
 pub use difference::{Change, ComparedSegment, ComparedTerritory, PartFigures};
 pub use flags::{ComparisonFlag, Reason, WhichScan};
 pub use noise::Noise;

@@ -16,7 +16,9 @@
 //! Not guaranteed: what both scans share, such as attenuation. Where uptake is higher at stress over much of the wall,
 //! that counts as noise.
 
-use super::calibration::{ROW_NOISE_SHARES, SMOOTH_PER_FINE_NOISE, USUAL_NOISE_POINTS};
+use super::calibration::{
+    MUSCLE_SD, MUSCLE_SD_PER_POINT, ROW_NOISE_SHARES, SMOOTH_PER_FINE_NOISE, USUAL_NOISE_POINTS,
+};
 use crate::base::geometry::random::{Purpose, stream, uniform};
 use crate::heart::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
 use rand::Rng;
@@ -31,6 +33,8 @@ const USUAL_FREEDOM: f64 = 8.0;
 const CORRELATION_PLACES: [f64; 2] = [2.1, 3.4];
 /// Rows and columns on either side that it takes in.
 const CORRELATION_REACH: [usize; 2] = [6, 10];
+/// Standard deviations by which the walls' volumes of one heart hardly differ.
+const MUSCLE_SDS: f64 = 4.0;
 /// The seed of all fields.
 const FIELD_SEED: u64 = 60;
 
@@ -83,6 +87,12 @@ impl Noise {
             smooth_points,
             fine_points,
         }
+    }
+
+    /// Whether walls whose volumes have this quotient may be of one heart.
+    pub fn explains_muscle(self, quotient: f64) -> bool {
+        let deviation = MUSCLE_SD.hypot(MUSCLE_SD_PER_POINT * self.points);
+        quotient.ln().abs() <= MUSCLE_SDS * deviation
     }
 
     /// Standard deviation at a place of the map, points.

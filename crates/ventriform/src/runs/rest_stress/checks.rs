@@ -5,7 +5,7 @@ use super::hearts::ComparedHeart;
 use super::order::ComparisonOrder;
 use crate::base::progress::Monitor;
 use crate::heart::comparison::{
-    Change, ComparisonFlag, FEW_COUNTS_LOSS_PERCENT, MOST_MUSCLE_QUOTIENT, Reason, WhichScan,
+    Change, ComparisonFlag, FEW_COUNTS_LOSS_PERCENT, Reason, WhichScan,
 };
 use crate::heart::normals::Perfusion;
 use crate::image::volume::{
@@ -142,8 +142,7 @@ pub(super) fn flags(
         }));
     }
     let [stress_ml, rest_ml] = [stress, rest].map(ComparedHeart::muscle_ml);
-    let quotient = stress_ml / rest_ml;
-    if !(1.0 / MOST_MUSCLE_QUOTIENT..=MOST_MUSCLE_QUOTIENT).contains(&quotient) {
+    if !change.noise.explains_muscle(stress_ml / rest_ml) {
         flags.push(ComparisonFlag::NotComparable(Reason::Muscle {
             stress_ml,
             rest_ml,
