@@ -195,6 +195,15 @@ class ComparedScan(Document):
     """Volume of the cavity of the anatomical wall."""
     confidence: float
     """Confidence of the fit, 0..=1."""
+    deficit_interval_percent: list[float] | None = None
+    """The interval of the deficit score."""
+    deficit_verdict: str | None = None
+    """Whether it is 5 per cent or more."""
+    extent_interval_percent: list[float] | None = None
+    """The interval of the share below the limit by noise, 5th and 95th percentile; `null` unless both scans have
+    limits, as for the others."""
+    extent_verdict: str | None = None
+    """Whether a twentieth of the wall or more is below the limit."""
     injected_dose: str | None = None
     """Total dose by the header, MBq."""
     input: FileFacts
@@ -283,34 +292,66 @@ class ComparisonReport(Document):
     """Share of the wall with muscle in both scans."""
     correlation: float
     """Correlation of both maps."""
+    detectable_percent: float
+    """The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a
+    territory."""
+    fixed_interval_percent: list[float]
+    """Its interval."""
     fixed_percent: float
     """Share of the wall below the threshold in both scans."""
+    fixed_verdict: str
+    """Whether there is such wall."""
     flags: list[Flag]
     """Reasons to look closer."""
+    lost_percent: float
+    """What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest."""
     matched_percent: float
     """Share of the wall by which stress was scaled."""
     no_beat: list[NoBeat]
     """Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one
     entry for each scan that is a reason. Empty where they were."""
+    noise_points: float
+    """Standard deviation of the smoothed difference by the noise of this pair, points."""
     parameters: dict[str, Any]
     """Every parameter, defaults written out."""
     rest: ComparedScan
     """The scan at rest."""
+    reverse_interval_percent: list[float]
+    """Its interval."""
+    reverse_percent: float
+    """Share of the wall that lacks uptake at rest beside stress (reverse redistribution)."""
+    reverse_verdict: str
+    """Whether there is such wall."""
+    reversible_interval_percent: list[float]
+    """Its interval by noise: 5th and 95th percentile, as for the others."""
     reversible_percent: float
-    """Share of the wall that loses more than `reversible_points` at stress."""
+    """Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss."""
     reversible_points: float
-    """Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two
-    scans of an unchanged heart."""
+    """Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count."""
+    reversible_verdict: str
+    """Whether wall loses uptake at stress."""
     scale: float
     """Counts of the stress scan that are one count of the rest scan where nothing changed."""
     sds: int | None = None
     """Summed difference score: what the segments' scores at stress exceed those at rest by."""
+    sds_interval: list[float] | None = None
+    """Its interval by noise, 5th and 95th percentile."""
+    sds_verdict: str | None = None
+    """Whether it is abnormal."""
     segments: list[ComparedSegment]
     """The 17 segments."""
     srs: int | None = None
     """Summed rest score."""
+    srs_interval: list[float] | None = None
+    """Its interval by noise, 5th and 95th percentile."""
+    srs_verdict: str | None = None
+    """Whether it is abnormal."""
     sss: int | None = None
     """Summed stress score, 0 to 68; `null` without normal limits, as for all scores."""
+    sss_interval: list[float] | None = None
+    """Its interval by noise, 5th and 95th percentile."""
+    sss_verdict: str | None = None
+    """Whether it is abnormal."""
     stress: ComparedScan
     """The scan at stress."""
     summed_percent: list[float] | None = None
@@ -320,6 +361,10 @@ class ComparisonReport(Document):
     tid: float
     """Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of
     all gates."""
+    tid_interval: list[float]
+    """The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs."""
+    tid_verdict: str
+    """Whether the cavity is larger at stress."""
     turn_degrees: float
     """How far the stress map is turned against the rest map, degrees."""
 

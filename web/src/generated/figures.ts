@@ -164,6 +164,8 @@ export const FIGURES = {
       "about": "Share of the wall below the normal limit.",
       "unit": "%",
       "digits": 0,
+      "interval": "extent_interval_percent",
+      "verdict": "extent_verdict",
       "headline": true,
       "code": "427751006, SCT"
     },
@@ -183,6 +185,8 @@ export const FIGURES = {
       "about": "Mean score of the wall, in per cent of the greatest.",
       "unit": "%",
       "digits": 1,
+      "interval": "deficit_interval_percent",
+      "verdict": "deficit_verdict",
       "headline": true,
       "code": "DEFICIT, 99VENTRIFORM"
     }
@@ -324,16 +328,20 @@ export const FIGURES = {
       "unit": "",
       "digits": 2,
       "short": "TID",
+      "interval": "tid_interval",
+      "verdict": "tid_verdict",
       "headline": true,
       "code": "428832008, SCT"
     },
     {
       "place": "reversible_percent",
       "label": "Reversible",
-      "about": "Share of the wall that loses uptake at stress.",
+      "about": "Share of the wall that loses uptake at stress, as far as half of the depth of the loss.",
       "unit": "%",
       "digits": 0,
       "short": "reversible",
+      "interval": "reversible_interval_percent",
+      "verdict": "reversible_verdict",
       "headline": true,
       "code": "REVERSIBLE, 99VENTRIFORM"
     },
@@ -344,8 +352,38 @@ export const FIGURES = {
       "unit": "%",
       "digits": 0,
       "short": "fixed",
+      "interval": "fixed_interval_percent",
+      "verdict": "fixed_verdict",
       "headline": true,
       "code": "FIXED, 99VENTRIFORM"
+    },
+    {
+      "place": "reverse_percent",
+      "label": "Reverse redistribution",
+      "about": "Share of the wall that lacks uptake at rest beside stress.",
+      "unit": "%",
+      "digits": 0,
+      "interval": "reverse_interval_percent",
+      "verdict": "reverse_verdict",
+      "code": "REVERSE, 99VENTRIFORM"
+    },
+    {
+      "place": "lost_percent",
+      "label": "Uptake lost at stress",
+      "about": "What stress lacks in the regions that lose uptake, in per cent of the whole wall's uptake at rest.",
+      "unit": "%",
+      "digits": 1,
+      "headline": true,
+      "code": "LOST, 99VENTRIFORM"
+    },
+    {
+      "place": "detectable_percent",
+      "label": "Least loss that would show",
+      "about": "The least loss of a territory that is found in nine of ten pairs with this noise.",
+      "unit": "%",
+      "digits": 0,
+      "headline": true,
+      "code": "DETECTABLE, 99VENTRIFORM"
     },
     {
       "place": "sss",
@@ -354,6 +392,8 @@ export const FIGURES = {
       "unit": "of 68",
       "digits": 0,
       "short": "SSS",
+      "interval": "sss_interval",
+      "verdict": "sss_verdict",
       "headline": true,
       "code": "82648-7, LN"
     },
@@ -364,6 +404,8 @@ export const FIGURES = {
       "unit": "of 68",
       "digits": 0,
       "short": "SRS",
+      "interval": "srs_interval",
+      "verdict": "srs_verdict",
       "headline": true,
       "code": "SRS, 99VENTRIFORM"
     },
@@ -374,6 +416,8 @@ export const FIGURES = {
       "unit": "of 68",
       "digits": 0,
       "short": "SDS",
+      "interval": "sds_interval",
+      "verdict": "sds_verdict",
       "headline": true,
       "code": "82644-6, LN"
     },
@@ -467,10 +511,19 @@ export const FIGURES = {
     {
       "place": "reversible_points",
       "label": "Loss that counts as reversible",
-      "about": "2.5 standard deviations of the difference of two scans of an unchanged heart.",
+      "about": "The least loss in smoothed maps that the noise of this pair does not explain.",
       "unit": "points",
       "digits": 0,
       "section": "How both scans were matched"
+    },
+    {
+      "place": "noise_points",
+      "label": "Noise of the difference",
+      "about": "Standard deviation of the smoothed difference by the noise of both scans.",
+      "unit": "points",
+      "digits": 1,
+      "section": "How both scans were matched",
+      "code": "NOISE, 99VENTRIFORM"
     },
     {
       "place": "turn_degrees",

@@ -702,6 +702,15 @@ export interface components {
              * @description Confidence of the fit, 0..=1.
              */
             confidence: number;
+            /** @description The interval of the deficit score. */
+            deficit_interval_percent?: number[] | null;
+            deficit_verdict?: components["schemas"]["Verdict"] | null;
+            /**
+             * @description The interval of the share below the limit by noise, 5th and 95th percentile; `null` unless both scans have limits,
+             *     as for the others.
+             */
+            extent_interval_percent?: number[] | null;
+            extent_verdict?: components["schemas"]["Verdict"] | null;
             /** @description Total dose by the header, MBq. */
             injected_dose?: string | null;
             /** @description The file. */
@@ -1081,11 +1090,25 @@ export interface components {
             correlation: number;
             /**
              * Format: double
+             * @description The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a territory.
+             */
+            detectable_percent: number;
+            /** @description Its interval. */
+            fixed_interval_percent: number[];
+            /**
+             * Format: double
              * @description Share of the wall below the threshold in both scans.
              */
             fixed_percent: number;
+            /** @description Whether there is such wall. */
+            fixed_verdict: components["schemas"]["Verdict"];
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
+            /**
+             * Format: double
+             * @description What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest.
+             */
+            lost_percent: number;
             /**
              * Format: double
              * @description Share of the wall by which stress was scaled.
@@ -1096,22 +1119,40 @@ export interface components {
              *     that is a reason. Empty where they were.
              */
             no_beat: components["schemas"]["NoBeat"][];
+            /**
+             * Format: double
+             * @description Standard deviation of the smoothed difference by the noise of this pair, points.
+             */
+            noise_points: number;
             /** @description Every parameter, defaults written out. */
             parameters: {
                 [key: string]: unknown;
             };
             /** @description The scan at rest. */
             rest: components["schemas"]["ComparedScan"];
+            /** @description Its interval. */
+            reverse_interval_percent: number[];
             /**
              * Format: double
-             * @description Share of the wall that loses more than `reversible_points` at stress.
+             * @description Share of the wall that lacks uptake at rest beside stress (reverse redistribution).
+             */
+            reverse_percent: number;
+            /** @description Whether there is such wall. */
+            reverse_verdict: components["schemas"]["Verdict"];
+            /** @description Its interval by noise: 5th and 95th percentile, as for the others. */
+            reversible_interval_percent: number[];
+            /**
+             * Format: double
+             * @description Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss.
              */
             reversible_percent: number;
             /**
              * Format: double
-             * @description Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two scans of an unchanged heart.
+             * @description Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count.
              */
             reversible_points: number;
+            /** @description Whether wall loses uptake at stress. */
+            reversible_verdict: components["schemas"]["Verdict"];
             /**
              * Format: double
              * @description Counts of the stress scan that are one count of the rest scan where nothing changed.
@@ -1122,6 +1163,9 @@ export interface components {
              * @description Summed difference score: what the segments' scores at stress exceed those at rest by.
              */
             sds?: number | null;
+            /** @description Its interval by noise, 5th and 95th percentile. */
+            sds_interval?: number[] | null;
+            sds_verdict?: components["schemas"]["Verdict"] | null;
             /** @description The 17 segments. */
             segments: components["schemas"]["ComparedSegment"][];
             /**
@@ -1129,11 +1173,17 @@ export interface components {
              * @description Summed rest score.
              */
             srs?: number | null;
+            /** @description Its interval by noise, 5th and 95th percentile. */
+            srs_interval?: number[] | null;
+            srs_verdict?: components["schemas"]["Verdict"] | null;
             /**
              * Format: int32
              * @description Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
              */
             sss?: number | null;
+            /** @description Its interval by noise, 5th and 95th percentile. */
+            sss_interval?: number[] | null;
+            sss_verdict?: components["schemas"]["Verdict"] | null;
             /** @description The scan at stress. */
             stress: components["schemas"]["ComparedScan"];
             /** @description The summed scores in per cent of 68, in that order. */
@@ -1145,6 +1195,10 @@ export interface components {
              * @description Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
              */
             tid: number;
+            /** @description The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs. */
+            tid_interval: number[];
+            /** @description Whether the cavity is larger at stress. */
+            tid_verdict: components["schemas"]["Verdict"];
             /**
              * Format: double
              * @description How far the stress map is turned against the rest map, degrees.
@@ -1204,11 +1258,14 @@ export interface components {
             fixed_percent: number;
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
+            /** @description Its interval by noise, 5th and 95th percentile; not there in comparisons made before it existed. */
+            reversible_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Share of the wall that loses uptake at stress.
              */
             reversible_percent: number;
+            reversible_verdict?: components["schemas"]["Verdict"] | null;
             /**
              * Format: int32
              * @description Summed difference score.
@@ -5406,6 +5463,11 @@ export interface components {
              */
             share_6: number;
         };
+        /**
+         * @description What may be said of a change.
+         * @enum {string}
+         */
+        Verdict: "yes" | "no" | "cannot_tell";
         /** @description A stored volume: what its header says. */
         Volume: {
             /** @description Maps a voxel index to millimetres in the patient frame LPS; row by row. */
@@ -5857,6 +5919,7 @@ export type Uncertainty = components['schemas']['Uncertainty'];
 export type UploadForm = components['schemas']['UploadForm'];
 export type UptakeChange = components['schemas']['UptakeChange'];
 export type Valence = components['schemas']['Valence'];
+export type Verdict = components['schemas']['Verdict'];
 export type Volume = components['schemas']['Volume'];
 export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeIntervals = components['schemas']['VolumeIntervals'];
