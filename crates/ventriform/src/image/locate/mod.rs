@@ -150,7 +150,11 @@ fn below_hot_organs(
     let mut best: Option<(f64, Cups)> = None;
     for share in CEILING_SHARES {
         let clipped = volume.clipped((share * brightest) as f32);
-        let cups = Cups::everywhere(&clipped, hints, monitor)?;
+        let cups = match Cups::everywhere(&clipped, hints, monitor) {
+            // Every value is above the ceiling.
+            Err(LocateError::Blank) => continue,
+            cups => cups?,
+        };
         if let Some(score) = cups.clear_score()
             && best.as_ref().is_none_or(|(other, _)| score > *other)
         {

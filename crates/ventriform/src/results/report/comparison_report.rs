@@ -14,16 +14,17 @@ use crate::image::grid::gates::GATE_COUNTS;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// The report of a comparison of rest and stress.
+/// The report of a comparison of rest and stress. Intervals, verdicts and what is known of the noise are `null` where it
+/// was made before they existed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ComparisonReport {
     /// Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
     pub tid: f64,
     /// The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs.
-    pub tid_interval: [f64; 2],
+    pub tid_interval: Option<[f64; 2]>,
     /// Whether the cavity is larger at stress.
-    pub tid_verdict: Verdict,
+    pub tid_verdict: Option<Verdict>,
     /// Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
     pub sss: Option<u32>,
     /// Its interval by noise, 5th and 95th percentile.
@@ -47,29 +48,29 @@ pub struct ComparisonReport {
     /// Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss.
     pub reversible_percent: f64,
     /// Its interval by noise: 5th and 95th percentile, as for the others.
-    pub reversible_interval_percent: [f64; 2],
+    pub reversible_interval_percent: Option<[f64; 2]>,
     /// Whether wall loses uptake at stress.
-    pub reversible_verdict: Verdict,
+    pub reversible_verdict: Option<Verdict>,
     /// Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count.
     pub reversible_points: f64,
     /// What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest.
-    pub lost_percent: f64,
+    pub lost_percent: Option<f64>,
     /// Share of the wall below the threshold in both scans.
     pub fixed_percent: f64,
     /// Its interval.
-    pub fixed_interval_percent: [f64; 2],
+    pub fixed_interval_percent: Option<[f64; 2]>,
     /// Whether there is such wall.
-    pub fixed_verdict: Verdict,
+    pub fixed_verdict: Option<Verdict>,
     /// Share of the wall that lacks uptake at rest beside stress (reverse redistribution).
-    pub reverse_percent: f64,
+    pub reverse_percent: Option<f64>,
     /// Its interval.
-    pub reverse_interval_percent: [f64; 2],
+    pub reverse_interval_percent: Option<[f64; 2]>,
     /// Whether there is such wall.
-    pub reverse_verdict: Verdict,
+    pub reverse_verdict: Option<Verdict>,
     /// Standard deviation of the smoothed difference by the noise of this pair, points.
-    pub noise_points: f64,
+    pub noise_points: Option<f64>,
     /// The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a territory.
-    pub detectable_percent: f64,
+    pub detectable_percent: Option<f64>,
     /// Counts of the stress scan that are one count of the rest scan where nothing changed.
     pub scale: f64,
     /// Share of the wall by which stress was scaled.
