@@ -282,7 +282,8 @@ class ComparedTerritory(Document):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ComparisonReport(Document):
-    """The report of a comparison of rest and stress."""
+    """The report of a comparison of rest and stress. Intervals, verdicts and what is known of the noise are `null`
+    where it was made before they existed."""
 
     _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "no_beat": "NoBeat[]", "rest": "ComparedScan", "segments": "ComparedSegment[]", "stress": "ComparedScan", "territories": "ComparedTerritory[]"}
 
@@ -292,43 +293,43 @@ class ComparisonReport(Document):
     """Share of the wall with muscle in both scans."""
     correlation: float
     """Correlation of both maps."""
-    detectable_percent: float
+    detectable_percent: float | None = None
     """The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a
     territory."""
-    fixed_interval_percent: list[float]
+    fixed_interval_percent: list[float] | None = None
     """Its interval."""
     fixed_percent: float
     """Share of the wall below the threshold in both scans."""
-    fixed_verdict: str
+    fixed_verdict: str | None = None
     """Whether there is such wall."""
     flags: list[Flag]
     """Reasons to look closer."""
-    lost_percent: float
+    lost_percent: float | None = None
     """What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest."""
     matched_percent: float
     """Share of the wall by which stress was scaled."""
     no_beat: list[NoBeat]
     """Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one
     entry for each scan that is a reason. Empty where they were."""
-    noise_points: float
+    noise_points: float | None = None
     """Standard deviation of the smoothed difference by the noise of this pair, points."""
     parameters: dict[str, Any]
     """Every parameter, defaults written out."""
     rest: ComparedScan
     """The scan at rest."""
-    reverse_interval_percent: list[float]
+    reverse_interval_percent: list[float] | None = None
     """Its interval."""
-    reverse_percent: float
+    reverse_percent: float | None = None
     """Share of the wall that lacks uptake at rest beside stress (reverse redistribution)."""
-    reverse_verdict: str
+    reverse_verdict: str | None = None
     """Whether there is such wall."""
-    reversible_interval_percent: list[float]
+    reversible_interval_percent: list[float] | None = None
     """Its interval by noise: 5th and 95th percentile, as for the others."""
     reversible_percent: float
     """Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss."""
     reversible_points: float
     """Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count."""
-    reversible_verdict: str
+    reversible_verdict: str | None = None
     """Whether wall loses uptake at stress."""
     scale: float
     """Counts of the stress scan that are one count of the rest scan where nothing changed."""
@@ -361,9 +362,9 @@ class ComparisonReport(Document):
     tid: float
     """Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of
     all gates."""
-    tid_interval: list[float]
+    tid_interval: list[float] | None = None
     """The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs."""
-    tid_verdict: str
+    tid_verdict: str | None = None
     """Whether the cavity is larger at stress."""
     turn_degrees: float
     """How far the stress map is turned against the rest map, degrees."""

@@ -1075,7 +1075,10 @@ export interface components {
              */
             tracer?: string;
         };
-        /** @description The report of a comparison of rest and stress. */
+        /**
+         * @description The report of a comparison of rest and stress. Intervals, verdicts and what is known of the noise are `null` where it
+         *     was made before they existed.
+         */
         ComparisonReport: {
             beat?: components["schemas"]["BeatChange"] | null;
             /**
@@ -1092,23 +1095,22 @@ export interface components {
              * Format: double
              * @description The least loss, per cent of the uptake at rest, that is found in nine of ten such pairs if it takes up a territory.
              */
-            detectable_percent: number;
+            detectable_percent?: number | null;
             /** @description Its interval. */
-            fixed_interval_percent: number[];
+            fixed_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Share of the wall below the threshold in both scans.
              */
             fixed_percent: number;
-            /** @description Whether there is such wall. */
-            fixed_verdict: components["schemas"]["Verdict"];
+            fixed_verdict?: components["schemas"]["Verdict"] | null;
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
             /**
              * Format: double
              * @description What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest.
              */
-            lost_percent: number;
+            lost_percent?: number | null;
             /**
              * Format: double
              * @description Share of the wall by which stress was scaled.
@@ -1123,7 +1125,7 @@ export interface components {
              * Format: double
              * @description Standard deviation of the smoothed difference by the noise of this pair, points.
              */
-            noise_points: number;
+            noise_points?: number | null;
             /** @description Every parameter, defaults written out. */
             parameters: {
                 [key: string]: unknown;
@@ -1131,16 +1133,15 @@ export interface components {
             /** @description The scan at rest. */
             rest: components["schemas"]["ComparedScan"];
             /** @description Its interval. */
-            reverse_interval_percent: number[];
+            reverse_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Share of the wall that lacks uptake at rest beside stress (reverse redistribution).
              */
-            reverse_percent: number;
-            /** @description Whether there is such wall. */
-            reverse_verdict: components["schemas"]["Verdict"];
+            reverse_percent?: number | null;
+            reverse_verdict?: components["schemas"]["Verdict"] | null;
             /** @description Its interval by noise: 5th and 95th percentile, as for the others. */
-            reversible_interval_percent: number[];
+            reversible_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Share of the wall that loses uptake at stress, each region as far as half of the depth of its loss.
@@ -1151,8 +1152,7 @@ export interface components {
              * @description Loss of uptake that noise does not explain, points: a region has to lose more somewhere to count.
              */
             reversible_points: number;
-            /** @description Whether wall loses uptake at stress. */
-            reversible_verdict: components["schemas"]["Verdict"];
+            reversible_verdict?: components["schemas"]["Verdict"] | null;
             /**
              * Format: double
              * @description Counts of the stress scan that are one count of the rest scan where nothing changed.
@@ -1196,9 +1196,8 @@ export interface components {
              */
             tid: number;
             /** @description The interval of TID: that of an unchanged heart holds 1 in nine of ten pairs. */
-            tid_interval: number[];
-            /** @description Whether the cavity is larger at stress. */
-            tid_verdict: components["schemas"]["Verdict"];
+            tid_interval?: number[] | null;
+            tid_verdict?: components["schemas"]["Verdict"] | null;
             /**
              * Format: double
              * @description How far the stress map is turned against the rest map, degrees.
