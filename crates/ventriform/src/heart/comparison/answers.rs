@@ -19,6 +19,7 @@
 use super::calibration::{BORDER_SD_SHARE, LIMIT_SDS, TID_SD, TID_SD_PER_POINT};
 use super::noise::fields;
 use super::side_by_side::Compared;
+use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::polar::{ARTERY_NAMES, segments_of};
 use serde::{Deserialize, Serialize};
 
@@ -172,16 +173,22 @@ struct Drawn {
 
 impl Answers {
     /// The answers about two maps.
-    pub(super) fn new(both: &Compared) -> Self {
-        let noise = fields(&both.areas, 2 * DRAWS);
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn new(both: &Compared, monitor: &Monitor) -> Result<Self, Cancelled> {
+        let noise = fields(&both.areas, 2 * DRAWS, monitor)?;
         let changes = both.changes(&both.difference);
         let expected: Vec<Option<f64>> = (both.difference.iter().enumerate())
             .map(|(index, own)| own.map(|own| if changes.is_about(index) { own } else { 0.0 }))
             .collect();
         let believed = believed_share(both);
         let draws: Vec<Drawn> = (noise.chunks_exact(2))
-            .map(|pair| drawn(both, &expected, believed, [&pair[0], &pair[1]]))
-            .collect();
+            .map(|pair| {
+                monitor.check()?;
+                Ok(drawn(both, &expected, believed, [&pair[0], &pair[1]]))
+            })
+            .collect::<Result<_, _>>()?;
         let percentile = |share: f64, of: &dyn Fn(&Drawn) -> f64| {
             percentile(draws.iter().map(of).collect(), share)
         };
@@ -194,12 +201,12 @@ impl Answers {
             let high = percentile(END_SHARES[1], &|draw| draw.high[share]);
             Answer::of_share(value[share], low, high, detectable)
         };
-        Self {
+        Ok(Self {
             reversible: answer(0),
             fixed: answer(1),
             reverse: answer(2),
             detectable_percent: detectable.min(100.0),
-        }
+        })
     }
 }
 

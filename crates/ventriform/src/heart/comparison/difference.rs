@@ -6,6 +6,7 @@ use super::noise::Noise;
 use super::scale::Sides;
 use super::side_by_side::{Changes, Compared};
 use super::turn::Turn;
+use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::polar::{ARTERY_NAMES, segments_of};
 
 /// The change from rest to stress.
@@ -111,9 +112,14 @@ impl Change {
     }
 
     /// The change between two maps; `None` where no wall can be compared, or one of them has no uptake.
-    pub fn between(sides: &Sides<'_>) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn between(sides: &Sides<'_>, monitor: &Monitor) -> Result<Option<Self>, Cancelled> {
         let turn = Turn::from_sides(sides);
-        let both = Compared::new(sides, turn.degrees)?;
+        let Some(both) = Compared::new(sides, turn.degrees) else {
+            return Ok(None);
+        };
         let changes = both.changes(&both.difference);
         let mut of_segment = [Sums::default(); 17];
         for index in 0..both.areas.len() {
@@ -137,13 +143,13 @@ impl Change {
         let all = of_segment.into_iter().fold(Sums::default(), Sums::add);
         let wall = sides.rest.pixels.iter().flatten();
         let wall: f64 = wall.map(|pixel| pixel.area).sum();
-        Some(Self {
+        Ok(Some(Self {
             turn,
             scale: both.matched.counts,
             matched_percent: 100.0 * both.matched.share,
             compared_percent: 100.0 * all.area / wall,
             noise: both.noise,
-            answers: Answers::new(&both),
+            answers: Answers::new(&both, monitor)?,
             lost_percent: lost_percent(&both, &changes),
             segments: std::array::from_fn(|index| ComparedSegment {
                 segment: index + 1,
@@ -159,7 +165,7 @@ impl Change {
                 }
             }),
             difference_points: both.difference,
-        })
+        }))
     }
 }
 

@@ -20,6 +20,7 @@ use super::calibration::{
     MUSCLE_SD, MUSCLE_SD_PER_POINT, ROW_NOISE_SHARES, SMOOTH_PER_FINE_NOISE, USUAL_NOISE_POINTS,
 };
 use crate::base::geometry::random::{Purpose, stream, uniform};
+use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
 use rand::Rng;
 
@@ -118,18 +119,26 @@ fn row_share(row: usize) -> f64 {
 
 /// `count` fields of correlated noise on the places of a map with these areas, row by row from apex to base: of mean
 /// square 1 in every row.
-pub(super) fn fields(areas: &[f64], count: usize) -> Vec<Vec<f64>> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) fn fields(
+    areas: &[f64],
+    count: usize,
+    monitor: &Monitor,
+) -> Result<Vec<Vec<f64>>, Cancelled> {
     let gaussian = MapGaussian::new(CORRELATION_PLACES, CORRELATION_REACH);
     let mut random = stream(FIELD_SEED, Purpose::ComparisonNoise);
     let mut made: Vec<Vec<f64>> = (0..count)
         .map(|_| {
+            monitor.check()?;
             let white = areas
                 .iter()
                 .map(|_| normal(&mut random))
                 .collect::<Vec<_>>();
-            gaussian.means(&white, areas)
+            Ok(gaussian.means(&white, areas))
         })
-        .collect();
+        .collect::<Result<_, _>>()?;
     for row in 0..RAY_ROWS {
         let own = row * RAY_COLUMNS..(row + 1) * RAY_COLUMNS;
         let squares: f64 = (made.iter())
@@ -142,7 +151,7 @@ pub(super) fn fields(areas: &[f64], count: usize) -> Vec<Vec<f64>> {
             values.for_each(|value| *value /= deviation);
         }
     }
-    made
+    Ok(made)
 }
 
 /// A number of the standard normal distribution, as twelve uniform ones less six: never beyond 6.
@@ -170,7 +179,7 @@ mod tests {
             ..Noise::USUAL
         };
         let fine = noise.points / SMOOTH_PER_FINE_NOISE;
-        for field in fields(&areas, 8) {
+        for field in fields(&areas, 8, &Monitor::silent()).unwrap() {
             let smoothed = difference(&field, noise);
             let raw_of = |smoothed: &[Option<f64>]| -> Vec<Option<f64>> {
                 let places = smoothed.iter().enumerate();
@@ -197,7 +206,8 @@ mod tests {
     /// Neighbours are alike, places far apart are not, and every row has the same deviation.
     #[test]
     fn fields_are_correlated_over_the_resolution() {
-        let made = fields(&vec![10.0; PLACES], 40);
+        let forty = || fields(&vec![10.0; PLACES], 40, &Monitor::silent()).unwrap();
+        let made = forty();
         let mean = |of: &dyn Fn(&[f64]) -> f64| {
             made.iter().map(|field| of(field)).sum::<f64>() / made.len() as f64
         };
@@ -210,6 +220,6 @@ mod tests {
         };
         assert!((product(0) - 1.0).abs() < 1e-9);
         assert!(product(2) > 0.8 && product(30).abs() < 0.2);
-        assert_eq!(made, fields(&vec![10.0; PLACES], 40));
+        assert_eq!(made, forty());
     }
 }

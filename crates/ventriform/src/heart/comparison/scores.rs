@@ -13,6 +13,7 @@ use super::answers::{Answer, DRAWS};
 use super::difference::Change;
 use super::noise::fields;
 use super::scale::Sides;
+use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::normals::{NoisyScores, Perfusion, ScanPlaces};
 
 /// The least abnormal summed score of a scan.
@@ -39,26 +40,36 @@ pub struct ScoreAnswers {
 
 impl ScoreAnswers {
     /// The scores of the scans at stress and at rest, whose maps `sides` are, and which differ by `change`.
-    pub fn new(perfusion: [&Perfusion; 2], sides: &Sides<'_>, change: &Change) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(
+        perfusion: [&Perfusion; 2],
+        sides: &Sides<'_>,
+        change: &Change,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let areas = ScanPlaces::from_map(sides.rest).area;
         // One point of the difference at stress and at rest, image units, of noise that both scans share evenly.
         let point = sides.rest.reference / 100.0 * std::f64::consts::FRAC_1_SQRT_2;
         let units = [change.scale * point, point];
-        let draws: Vec<[NoisyScores; 2]> = (fields(&areas, 2 * DRAWS).chunks_exact(2))
+        let noise = fields(&areas, 2 * DRAWS, monitor)?;
+        let draws: Vec<[NoisyScores; 2]> = (noise.chunks_exact(2))
             .map(|pair| {
-                [0, 1].map(|scan| {
+                monitor.check()?;
+                Ok([0, 1].map(|scan| {
                     let noise =
                         |index: usize| units[scan] * change.noise.at(index) * pair[scan][index];
                     perfusion[scan].with_noise(noise)
-                })
+                }))
             })
-            .collect();
+            .collect::<Result<_, _>>()?;
         let found = perfusion.map(|own| own.with_noise(|_| 0.0));
         let answer = |abnormal: f64, of: &dyn Fn(&[NoisyScores; 2]) -> f64| {
             let drawn: Vec<f64> = draws.iter().map(of).collect();
             Answer::of_score(of(&found), &drawn, abnormal)
         };
-        Self {
+        Ok(Self {
             sss: answer(ABNORMAL_SUM, &|both| f64::from(both[0].summed_score())),
             srs: answer(ABNORMAL_SUM, &|both| f64::from(both[1].summed_score())),
             sds: answer(ABNORMAL_DIFFERENCE, &|both| {
@@ -67,6 +78,6 @@ impl ScoreAnswers {
             extent: [0, 1].map(|scan| answer(ABNORMAL_PERCENT, &|both| both[scan].extent_percent)),
             deficit: [0, 1]
                 .map(|scan| answer(ABNORMAL_PERCENT, &|both| both[scan].deficit_percent)),
-        }
+        })
     }
 }

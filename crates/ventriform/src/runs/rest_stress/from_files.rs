@@ -55,9 +55,10 @@ pub fn from_files(
         stress: stress.map().ok_or(none(WhichScan::Stress))?,
         rest: rest.map().ok_or(none(WhichScan::Rest))?,
     };
-    let change = Change::between(&sides).ok_or(ComparisonError::NothingInCommon)?;
+    let change = Change::between(&sides, monitor)?.ok_or(ComparisonError::NothingInCommon)?;
     let scores = (stress.perfusion().zip(rest.perfusion()))
-        .map(|(stress, rest)| ScoreAnswers::new([stress, rest], &sides, &change));
+        .map(|(stress, rest)| ScoreAnswers::new([stress, rest], &sides, &change, monitor))
+        .transpose()?;
     Ok(ComparedHearts {
         flags: checks::flags(&stress, &rest, &change),
         stress,
