@@ -1,14 +1,15 @@
 // Two scans of one patient, and what is asked before they are compared.
 
-import { useMemo, useState } from "preact/hooks";
-import { type Volume, fieldOf, words } from "./api";
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { type Result, type Volume, fieldOf, words } from "./api";
+import { correctedFits, correctionsOf } from "./corrections";
+import { beats, fits, loadResultsOf, volumes } from "./library";
 import { areOfTwoPatients, picked, statedRole, stressOf } from "./pairing";
 import { type Draft, ParameterForm, parameterSpecs, valuesOf } from "./parameters";
 import { openComparison } from "./route";
 import { useWatched } from "./state";
-import { acquisition, cut, moment, nameOf, study } from "./words";
+import { acquisition, cut, moment, nameOf, resultName, study } from "./words";
 import { fileComparison } from "./work";
-import { volumes } from "./library";
 
 const TOLD = {
   headers: "Filled in from the headers.",
@@ -44,6 +45,15 @@ export function PairForm({
   const twoPatients = otherPatient || areOfTwoPatients(a, b);
   const asOnePatient = draft["same_patient"] === "true";
   const alike = statedRole(a) !== null && statedRole(a) === statedRole(b);
+  useEffect(() => pair.forEach(volume => loadResultsOf(volume.id)), [a.id, b.id]);
+  const known = useWatched(fits).length + useWatched(beats).length;
+  const corrected = useMemo(() => pair.map(volume => correctedFits(volume.id)), [a.id, b.id, known]);
+  // What was chosen of each scan: the id of a fit, or "" for a new one; nothing means the newest correction.
+  const [fitOf, setFitOf] = useState<Record<string, string>>({});
+  const chosenFit = (at: number): string | null => {
+    const volume = pair[at];
+    return (volume && fitOf[volume.id]) ?? corrected[at]?.[0]?.id ?? null;
+  };
   const send = async (event: Event) => {
     event.preventDefault();
     if (!stress) return;
@@ -52,9 +62,14 @@ export function PairForm({
     try {
       const { normals, ...parameters } = valuesOf(draft, (await parameterSpecs()).comparison);
       const [atStress, atRest] = stress === a.id ? [a, b] : [b, a];
+      const ofScan = { stress: chosenFit(stress === a.id ? 0 : 1), rest: chosenFit(stress === a.id ? 1 : 0) };
+      // Corrections that an earlier comparison had would go before those of the fit.
+      for (const role of ["stress", "rest"] as const)
+        if (ofScan[role]) for (const name of correctionsOf(role)) delete parameters[name];
       const job = await fileComparison({
         stress: atStress,
         rest: atRest,
+        fits: { stress: ofScan.stress || null, rest: ofScan.rest || null },
         normals: typeof normals === "string" ? normals : null,
         parameters,
       });
@@ -69,27 +84,35 @@ export function PairForm({
     <form class="pair-form" aria-label="Compare rest and stress" onSubmit={event => void send(event)}>
       <fieldset>
         <legend>Which scan is stress?</legend>
-        {pair.map(volume => (
-          <label key={volume.id} class="pair-choice">
-            <input
-              type="radio"
-              name="stress"
-              value={volume.id}
-              checked={stress === volume.id}
-              onChange={() => setStress(volume.id)}
-            />
-            <span>
-              <b title={nameOf(volume)}>{cut(nameOf(volume))}</b>
-              {stress && (
-                <span class={`role ${stress === volume.id ? "stress" : "rest"}`}>
-                  {stress === volume.id ? "stress" : "rest"}
+        {pair.map((volume, at) => (
+          <div key={volume.id}>
+            <label class="pair-choice">
+              <input
+                type="radio"
+                name="stress"
+                value={volume.id}
+                checked={stress === volume.id}
+                onChange={() => setStress(volume.id)}
+              />
+              <span>
+                <b title={nameOf(volume)}>{cut(nameOf(volume))}</b>
+                {stress && (
+                  <span class={`role ${stress === volume.id ? "stress" : "rest"}`}>
+                    {stress === volume.id ? "stress" : "rest"}
+                  </span>
+                )}
+                <span class="quiet">
+                  {[study(volume, cut), ...acquisition(volume), moment(volume.created_at)].filter(Boolean).join(" · ")}
                 </span>
-              )}
-              <span class="quiet">
-                {[study(volume, cut), ...acquisition(volume), moment(volume.created_at)].filter(Boolean).join(" · ")}
               </span>
-            </span>
-          </label>
+            </label>
+            <FitChoice
+              name={nameOf(volume)}
+              fits={corrected[at] ?? []}
+              chosen={chosenFit(at) ?? ""}
+              onChoice={id => setFitOf({ ...fitOf, [volume.id]: id })}
+            />
+          </div>
         ))}
       </fieldset>
       <p class="quiet">{guess.told ? TOLD[guess.told] : "Not stated in headers or names: please choose."}</p>
@@ -127,6 +150,34 @@ export function PairForm({
         )}
       </span>
     </form>
+  );
+}
+
+interface FitChoiceProps {
+  name: string;
+  fits: Result[];
+  chosen: string;
+  onChoice: (id: string) => void;
+}
+
+/** Which correction of a scan is kept; nothing where there is none. */
+function FitChoice({ name, fits, chosen, onChoice }: FitChoiceProps) {
+  if (fits.length === 0) return null;
+  return (
+    <label class="field">
+      Placed as in
+      <select
+        aria-label={`${name}: placed as in`}
+        value={chosen}
+        onChange={event => onChoice(event.currentTarget.value)}>
+        {fits.map(fit => (
+          <option key={fit.id} value={fit.id}>
+            {resultName(fit)}, {moment(fit.created_at)}
+          </option>
+        ))}
+        <option value="">no earlier fit</option>
+      </select>
+    </label>
   );
 }
 

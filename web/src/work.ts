@@ -20,13 +20,16 @@ function follow(job: Job): Job {
 export interface Pair {
   stress: Volume;
   rest: Volume;
+  /** Fits of the scans whose corrections are kept. */
+  fits: { stress: string | null; rest: string | null };
   normals: string | null;
   parameters: Record<string, ParameterValue>;
 }
 
-export async function fileComparison({ stress, rest, normals, parameters }: Pair): Promise<Job> {
+export async function fileComparison({ stress, rest, fits, normals, parameters }: Pair): Promise<Job> {
   const labels = { name: storedNameOf(stress).slice(0, 200) };
-  const order = { stress: stress.id, rest: rest.id, parameters, labels, ...(normals ? { normals } : {}) };
+  const scans = { stress: fits.stress ?? stress.id, rest: fits.rest ?? rest.id };
+  const order = { ...scans, parameters, labels, ...(normals ? { normals } : {}) };
   return follow(await post<Job>("/v1/comparisons", order));
 }
 

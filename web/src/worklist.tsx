@@ -3,6 +3,7 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
+import { newerCorrections } from "./corrections";
 import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
 import {
@@ -497,6 +498,7 @@ function ComparisonLink({ made }: { made: Result }) {
   return (
     <a class="result" href={`#/comparison/${made.id}`}>
       <b>{resultName(made)}</b> {figures(made)}
+      {newerCorrections(made).length > 0 && <span class="quiet"> older than a correction</span>}
     </a>
   );
 }

@@ -138,6 +138,42 @@ export async function comparisons(tools) {
     return (await fetch(address + links.report, { headers: { accept: "application/json" } })).json();
   };
 
+  // A fit that is corrected after its scan was compared: list and comparison say so, and the next one keeps it.
+  const corrected = async address => {
+    const ask = async (path, order) => {
+      const body = order && {
+        method: "POST",
+        headers: { "content-type": "application/json" },
+        body: JSON.stringify(order),
+      };
+      return (await fetch(address + path, body)).json();
+    };
+    const [made] = (await ask("/v1/comparisons")).comparisons;
+    const { base } = (await reportOf(address, made.id)).stress.long_axis;
+    let job = await ask("/v1/jobs", { kind: "segmentation", volume: made.volume, parameters: { base } });
+    while (!/succeeded|failed|cancelled/.test(job.state)) job = await ask(job.links.self);
+    assert.equal(job.state, "succeeded", JSON.stringify(job.error));
+    const { page, faults, close } = await tab(browser, address, { width: 1440, height: 900 });
+    await page.waitForSelector(".study");
+    assert.match(await page.textContent(".study-head .result"), /older than a correction/);
+    await page.locator(".study-head .result").first().click();
+    await displayed(page);
+    assert.match(await page.textContent(".comparison .facts .warning"), /fit at stress was corrected/);
+    await look(page, "comparison-outdated");
+    await page.getByRole("button", { name: "Compare again" }).click();
+    const choice = page.locator(".pair-form select[aria-label$='placed as in']");
+    assert.equal(await choice.count(), 1, "the other scan has no corrected fit");
+    assert.match(await choice.locator("option:checked").textContent(), /^Corrected fit/);
+    await look(page, "pair-form-corrected");
+    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).click();
+    await page.waitForFunction(id => /cmp_/.test(location.hash) && !location.hash.includes(id), made.id);
+    await displayed(page);
+    assert.equal(await page.locator(".comparison .facts .warning").count(), 0);
+    const [again] = (await ask("/v1/comparisons")).comparisons;
+    assert.deepEqual(again.parameters.stress_base, base);
+    assert.deepEqual(faults, []);
+    await close();
+  };
   await check("rest and stress: five actions from two files to the display, figures as the service says", async () => {
     const { stress, rest } = data();
     const own = await service();
@@ -231,6 +267,7 @@ export async function comparisons(tools) {
       assert.deepEqual(faults, []);
       await close();
     }
+    await corrected(own.address);
     await own.stop();
   });
 

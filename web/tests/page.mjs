@@ -124,11 +124,18 @@ async function look(page, name) {
   const columns = await page.evaluate(() =>
     [...document.querySelectorAll(".side, .facts")].map(column => {
       const right = column.getBoundingClientRect().right;
-      const inner = [...column.querySelectorAll("*")].filter(one => one.getBoundingClientRect().right > right + 1 && !one.closest(".wide table"));
-      return [column.className, column.scrollWidth - column.clientWidth, ...inner.slice(0, 4).map(one => `${one.tagName}.${one.className} ${one.textContent.slice(0, 20)}`)];
+      const inner = [...column.querySelectorAll("*")].filter(
+        one => one.getBoundingClientRect().right > right + 1 && !one.closest(".wide table"),
+      );
+      return [
+        column.className,
+        column.scrollWidth - column.clientWidth,
+        ...inner.slice(0, 4).map(one => `${one.tagName}.${one.className} ${one.textContent.slice(0, 20)}`),
+      ];
     }),
   );
-  for (const [column, over, ...which] of columns) assert.ok(over <= 0, `${name}: ${column} scrolls by ${over} px: ${which}`);
+  for (const [column, over, ...which] of columns)
+    assert.ok(over <= 0, `${name}: ${column} scrolls by ${over} px: ${which}`);
   // axe runs in a world of its own, so the policy of the page does not apply to it.
   const session = await page.context().newCDPSession(page);
   const { frameTree } = await session.send("Page.getFrameTree");

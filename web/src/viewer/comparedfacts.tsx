@@ -1,10 +1,14 @@
 // What a comparison says in figures and words.
 
 import type { ComponentChildren } from "preact";
+import type { Result } from "../api";
+import { newerCorrections } from "../corrections";
 import { BesideTable, PartTable, figureOf, flatName, intervalOf, rowsOf, verdictOf, written } from "../figures";
 import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
+import { beats, fits } from "../library";
 import { Simulated } from "../limits";
-import { number } from "../words";
+import { useWatched } from "../state";
+import { moment, number } from "../words";
 import { flagsOf, isSimulated } from "./compared";
 
 /** The figures that are read first: name, figure, and what stands smaller beside it. */
@@ -85,6 +89,20 @@ export function Reasons({ report }: { report: ComparisonReport }) {
 
 function sentence(text: string): string {
   return `${text.charAt(0).toUpperCase()}${text.slice(1)}${/[.!?]$/.test(text) ? "" : "."}`;
+}
+
+/** That a fit of its scans was corrected after the comparison was made; nothing where none was. */
+export function Outdated({ made }: { made: Result }) {
+  useWatched(fits);
+  useWatched(beats);
+  const newer = newerCorrections(made);
+  if (newer.length === 0) return null;
+  return (
+    <p class="warning">
+      {newer.map(([role, fit]) => `The fit at ${role} was corrected on ${moment(fit.created_at)}.`).join(" ")} This
+      comparison is older and does not have the correction: compare again.
+    </p>
+  );
 }
 
 /** The limits by which it was scored, in words. */

@@ -5,6 +5,7 @@ import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
 import {
   Headlines,
+  Outdated,
   LimitsUsed,
   PerfusionTable,
   Reasons,
@@ -85,6 +86,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
         ))}
         <SimulatedNote report={report} />
       </div>
+      <Outdated made={result} />
       <Headlines report={report} />
       <Drawn
         width={WIDTH}

@@ -5,7 +5,17 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Parameters, type Result, type Volume, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
 import { JobLine, Trouble } from "../jobline";
-import { comparisons, eraseResult, find, isActive, jobs, loadResult, put, watchActive } from "../library";
+import {
+  comparisons,
+  eraseResult,
+  find,
+  isActive,
+  jobs,
+  loadResult,
+  loadResultsOf,
+  put,
+  watchActive,
+} from "../library";
 import { PairForm } from "../pairform";
 import { type Draft, draftOf, parameterSpecs } from "../parameters";
 import { home } from "../route";
@@ -15,6 +25,7 @@ import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared
 import {
   BeatTable,
   Headlines,
+  Outdated,
   LimitsUsed,
   MatchTable,
   PerfusionTable,
@@ -148,6 +159,7 @@ function Shown({ id }: { id: string }) {
       if (gone) return;
       setResult(found);
       setScans({ stress: atStress, rest: atRest });
+      for (const scan of [atStress, atRest]) loadResultsOf(scan.id);
       setCompared(loaded);
     };
     read().catch(error => !gone && setProblem(words(error)));
@@ -184,6 +196,7 @@ function Comparison({ compared, scans }: ComparisonProps) {
       <aside class="facts" aria-label="Figures">
         <Head compared={compared} scans={scans} />
         <Takeaways result={compared.result} volume={scans.stress} />
+        <Outdated made={compared.result} />
         {areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Headlines report={compared.report} />
         <SimulatedNote report={compared.report} />
