@@ -162,6 +162,7 @@ export async function comparisons(tools) {
     await look(page, "comparison-outdated");
     await page.getByRole("button", { name: "Compare again" }).click();
     const choice = page.locator(".pair-form select[aria-label$='placed as in']");
+    await choice.first().waitFor();
     assert.equal(await choice.count(), 1, "the other scan has no corrected fit");
     assert.match(await choice.locator("option:checked").textContent(), /^Corrected fit/);
     await look(page, "pair-form-corrected");
