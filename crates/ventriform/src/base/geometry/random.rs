@@ -34,6 +34,11 @@ pub fn stream(seed: u64, purpose: Purpose) -> Pcg64 {
     Pcg64::new(u128::from(seed), purpose as u128)
 }
 
+/// A number of the standard normal distribution, as twelve uniform ones less six: never beyond 6.
+pub fn normal(random: &mut impl Rng) -> f64 {
+    (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0
+}
+
 /// A number in [0, 1) with 53 random bits.
 pub fn uniform(random: &mut impl Rng) -> f64 {
     (random.next_u64() >> 11) as f64 * (-53_f64).exp2()

@@ -59,6 +59,19 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted[below] + (sorted[above] - sorted[below]) * place.fract()
 }
 
+/// The least of these values below or at which `share`, 0..=1, of the weight lies; `None` without values. Each is a value
+/// with its weight.
+pub fn weighted_quantile(mut values: Vec<(f64, f64)>, share: f64) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = values.iter().map(|(_, weight)| weight).sum();
+    let mut below = 0.0;
+    let found = values.iter().find(|(_, weight)| {
+        below += weight;
+        below >= share * all
+    });
+    found.map(|(value, _)| *value)
+}
+
 /// The middle one of these numbers in order; of two in the middle the greater.
 ///
 /// # Panics
@@ -72,6 +85,17 @@ pub fn upper_median(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_value_of_twice_the_weight_counts_as_two() {
+        let weighted = vec![(3.0, 1.0), (1.0, 2.0), (2.0, 1.0)];
+        let each = |share| weighted_quantile(weighted.clone(), share);
+        assert_eq!(
+            [0.5, 0.6, 0.75, 1.0].map(each),
+            [1.0, 2.0, 2.0, 3.0].map(Some)
+        );
+        assert_eq!(weighted_quantile(Vec::new(), 0.5), None);
+    }
 
     #[test]
     fn many_values_are_sorted_as_few_are() {

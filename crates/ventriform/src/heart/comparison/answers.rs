@@ -58,6 +58,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// What may be said where noise excludes that there is none (`yes`), or that there is one (`no`).
+    fn of(yes: bool, no: bool) -> Self {
+        match (yes, no) {
+            (true, _) => Self::Yes,
+            (false, true) => Self::No,
+            (false, false) => Self::CannotTell,
+        }
+    }
+
     /// `yes`, `no` or `cannot tell`.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -88,17 +97,11 @@ impl Answer {
             (value + border.hypot(high.max(value) - value)).min(100.0),
         ];
         let seen = detectable_percent <= FEW_COUNTS_LOSS_PERCENT;
-        let verdict = if low.min(value) > SMALL_PERCENT {
-            Verdict::Yes
-        } else if value <= SMALL_PERCENT && interval[1] <= LARGE_PERCENT && seen {
-            Verdict::No
-        } else {
-            Verdict::CannotTell
-        };
+        let denied = value <= SMALL_PERCENT && interval[1] <= LARGE_PERCENT && seen;
         Self {
             value,
             interval,
-            verdict,
+            verdict: Verdict::of(low.min(value) > SMALL_PERCENT, denied),
         }
     }
 
@@ -106,17 +109,10 @@ impl Answer {
     pub(super) fn of_score(value: f64, drawn: &[f64], abnormal: f64) -> Self {
         let [low, high] = ends(drawn);
         let interval = [low.min(value), high.max(value)];
-        let verdict = if interval[0] >= abnormal {
-            Verdict::Yes
-        } else if interval[1] < abnormal {
-            Verdict::No
-        } else {
-            Verdict::CannotTell
-        };
         Self {
             value,
             interval,
-            verdict,
+            verdict: Verdict::of(interval[0] >= abnormal, interval[1] < abnormal),
         }
     }
 
@@ -125,17 +121,10 @@ impl Answer {
     pub fn of_tid(tid: f64, noise_points: f64) -> Self {
         let deviation = TID_SD.hypot(TID_SD_PER_POINT * noise_points);
         let interval = [-1.0, 1.0].map(|side| tid * (side * HALF_WIDTH_SDS * deviation).exp());
-        let verdict = if interval[0] > 1.0 {
-            Verdict::Yes
-        } else if interval[1] < MOST_NORMAL_TID {
-            Verdict::No
-        } else {
-            Verdict::CannotTell
-        };
         Self {
             value: tid,
             interval,
-            verdict,
+            verdict: Verdict::of(interval[0] > 1.0, interval[1] < MOST_NORMAL_TID),
         }
     }
 }

@@ -7,13 +7,15 @@
 //!    touch by a side are one region; it counts if it exceeds the limit somewhere.
 //! 2. A loss is a share of the uptake that was there. The depth of a region is the share that all but the deepest
 //!    part of it lose ([`DEPTH_QUANTILE`]): the greatest share follows noise.
-//! 3. The region ends at half of its depth: there the border of an even loss stays where it is, however the image is blurred.
+//! 3. The region ends at half of its depth: there the border of an even loss stays where it is, however the image is
+//!    blurred.
 //!
 //! Not guaranteed: of two defects that touch, the one of less than half the depth of the other is left out.
 
 use super::calibration::LIMIT_SDS;
 use super::noise::Noise;
 use crate::base::numeric::disjoint_sets::{set_numbers, singletons, unite};
+use crate::base::numeric::order::weighted_quantile;
 use crate::heart::polar::{RAY_COLUMNS, RAY_ROWS};
 
 /// Share of the limit down to which a region reaches before its depth is known.
@@ -105,17 +107,9 @@ impl Field<'_> {
 
     /// The share that [`DEPTH_QUANTILE`] of the region's area lose less than.
     fn depth(&self, region: &[usize]) -> f64 {
-        let mut shares: Vec<(f64, f64)> = (region.iter())
-            .map(|index| (self.lost_share(*index), self.areas[*index]))
-            .collect();
-        shares.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all: f64 = shares.iter().map(|(_, area)| area).sum();
-        let mut below = 0.0;
-        let found = shares.iter().find(|(_, area)| {
-            below += area;
-            below >= DEPTH_QUANTILE * all
-        });
-        found.map_or(0.0, |(share, _)| *share)
+        let shares = region.iter();
+        let shares = shares.map(|index| (self.lost_share(*index), self.areas[*index]));
+        weighted_quantile(shares.collect(), DEPTH_QUANTILE).unwrap_or(0.0)
     }
 }
 

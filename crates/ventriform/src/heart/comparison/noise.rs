@@ -19,10 +19,9 @@
 use super::calibration::{
     MUSCLE_SD, MUSCLE_SD_PER_POINT, ROW_NOISE_SHARES, SMOOTH_PER_FINE_NOISE, USUAL_NOISE_POINTS,
 };
-use crate::base::geometry::random::{Purpose, stream, uniform};
+use crate::base::geometry::random::{Purpose, normal, stream};
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
-use rand::Rng;
 
 /// Rows of the map that [`ROW_NOISE_SHARES`] stand for; between them noise is linear, beyond them it is constant.
 const SHARE_ROWS: [f64; 3] = [3.5, 11.5, 19.5];
@@ -152,11 +151,6 @@ pub(super) fn fields(
         }
     }
     Ok(made)
-}
-
-/// A number of the standard normal distribution, as twelve uniform ones less six: never beyond 6.
-fn normal(random: &mut impl Rng) -> f64 {
-    (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0
 }
 
 #[cfg(test)]

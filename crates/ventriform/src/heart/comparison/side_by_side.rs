@@ -66,8 +66,7 @@ impl Compared {
             ..rest.clone()
         };
         let usual = Self::with_noise(sides, &stress, &rest, Noise::USUAL)?;
-        let found = Self::with_noise(sides, &stress, &rest, usual.noise)?;
-        Some(found)
+        Self::with_noise(sides, &stress, &rest, usual.noise)
     }
 
     /// The maps on the scale that fits wall with this noise.

@@ -21,7 +21,7 @@ use super::perfusion::{HeartFigure, figures};
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use super::sizes::FEWEST_CASES;
 use crate::base::numeric::decimals::round;
-use crate::base::numeric::order::quantile;
+use crate::base::numeric::order::{quantile, weighted_quantile};
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
 use rayon::prelude::*;
@@ -300,18 +300,8 @@ fn variance(values: Vec<f64>) -> f64 {
 /// The median of a scan's muscle by area; 1 without any.
 fn median_uptake(scan: &ScanPlaces) -> f64 {
     let muscle = scan.uptake.iter().zip(&scan.area);
-    let mut values: Vec<(f64, f64)> = muscle
-        .filter_map(|(uptake, area)| Some(((*uptake)?, *area)))
-        .collect();
-    values.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let all: f64 = values.iter().map(|(_, area)| area).sum();
-    let mut below = 0.0;
-    let found = values.iter().find(|(_, area)| {
-        below += area;
-        below >= 0.5 * all
-    });
-    found
-        .map(|(value, _)| *value)
+    let values = muscle.filter_map(|(uptake, area)| Some(((*uptake)?, *area)));
+    weighted_quantile(values.collect(), 0.5)
         .filter(|value| *value > 0.0)
         .unwrap_or(1.0)
 }

@@ -2,6 +2,7 @@
 
 use super::pattern::{Coefficients, RatioAt, TermMatrix, fitted, share_at};
 use super::place_limits::{ComparedPlace, PlaceLimits, ScanPlaces};
+use crate::base::numeric::order::weighted_quantile;
 
 /// Standard deviations from the mean up to which a place looks normal, on either side.
 pub const MATCHED_Z: f64 = 2.0;
@@ -85,16 +86,7 @@ pub(super) fn matched_places(places: &[ComparedPlace], precision: &TermMatrix) -
 
 /// The ratio to the mean below which [`FIRST_SCALE_SHARE`] of the wall lies.
 fn first_scale(places: &[ComparedPlace]) -> f64 {
-    let mut ratios: Vec<(f64, f64)> = places
-        .iter()
-        .map(|place| (place.uptake / place.mean, place.area))
-        .collect();
-    ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let all: f64 = ratios.iter().map(|(_, area)| area).sum();
-    let mut below = 0.0;
-    let found = ratios.iter().find(|(_, area)| {
-        below += area;
-        below >= FIRST_SCALE_SHARE * all
-    });
-    found.map_or(0.0, |(ratio, _)| *ratio)
+    let ratios = places.iter();
+    let ratios = ratios.map(|place| (place.uptake / place.mean, place.area));
+    weighted_quantile(ratios.collect(), FIRST_SCALE_SHARE).unwrap_or(0.0)
 }

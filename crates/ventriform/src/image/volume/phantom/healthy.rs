@@ -5,8 +5,7 @@
 //! make limits that a program can be tested with.
 
 use super::parameters::{PhantomParameters, UptakeVariation};
-use crate::base::geometry::random::{Purpose, stream, uniform};
-use rand::Rng;
+use crate::base::geometry::random::{Purpose, normal, stream};
 
 /// A healthy heart's parameters and whose it is.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,9 +44,4 @@ pub fn healthy_person(seed: u64, base: &PhantomParameters) -> HealthyPerson {
         ..base.clone()
     };
     HealthyPerson { female, parameters }
-}
-
-/// A number of the standard normal distribution, as twelve uniform ones less six: never beyond 6.
-fn normal(random: &mut impl Rng) -> f64 {
-    (0..12).map(|_| uniform(random)).sum::<f64>() - 6.0
 }
