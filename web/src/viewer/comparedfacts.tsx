@@ -11,8 +11,8 @@ import { useWatched } from "../state";
 import { moment, number } from "../words";
 import { flagsOf, isSimulated } from "./compared";
 
-/** The figures that are read first: name, figure, and what stands smaller beside it. */
-export function headlinesOf(report: ComparisonReport): [string, string, string][] {
+/** The figures that are read first: name, figure, what stands smaller beside it, and what it is. */
+export function headlinesOf(report: ComparisonReport): [string, string, string, string][] {
   const beside = besideHeadlines(report);
   return rowsOf("ComparisonReport")
     .filter(row => row.short && figureOf(row, report) !== undefined)
@@ -22,6 +22,7 @@ export function headlinesOf(report: ComparisonReport): [string, string, string][
       [beside[row.place], intervalOf(row, report) && `90 %: ${intervalOf(row, report)}`, verdictOf(row, report)]
         .filter(Boolean)
         .join("; "),
+      row.about,
     ]);
 }
 
@@ -46,9 +47,9 @@ function besideHeadlines(report: ComparisonReport): Record<string, string> {
 export function Headlines({ report }: { report: ComparisonReport }) {
   return (
     <dl class="headlines compared-headlines">
-      {headlinesOf(report).map(([name, value, beside]) => (
+      {headlinesOf(report).map(([name, value, beside, about]) => (
         <div key={name}>
-          <dt>{name}</dt>
+          <dt title={about}>{name}</dt>
           <dd>
             {value}
             {beside && <span class="interval">{beside}</span>}
@@ -56,6 +57,17 @@ export function Headlines({ report }: { report: ComparisonReport }) {
         </div>
       ))}
     </dl>
+  );
+}
+
+/** What tells both measures of the change apart, where both stand. */
+export function BothMeasures({ report }: { report: ComparisonReport }) {
+  if (report.sds == null) return null;
+  return (
+    <p class="quiet">
+      The reversible share says how large the part of the wall is that loses uptake at stress; SDS says how much it
+      loses, in points of 17 segments scored 0 to 4 (in per cent of 68).
+    </p>
   );
 }
 
@@ -264,6 +276,22 @@ export function madeWith({
   ]
     .filter(Boolean)
     .join(" · ");
+}
+
+/** What attenuation may have to do with the extents of both scans. */
+export function AttenuationNotes({ report }: { report: ComparisonReport }): ComponentChildren {
+  const scans: [string, ComparedScan][] = [
+    ["Stress", report.stress],
+    ["Rest", report.rest],
+  ];
+  return scans.map(
+    ([name, { polar }]) =>
+      polar?.attenuation && (
+        <p key={name} class="quiet">
+          {name}: {polar.attenuation.note}
+        </p>
+      ),
+  );
 }
 
 export function SimulatedNote({ report }: { report: ComparisonReport }): ComponentChildren {

@@ -148,6 +148,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
           </div>
         </div>
         {polar?.note && <p class="quiet">Uptake: {polar.note}.</p>}
+        {polar?.attenuation && <p class="quiet">{polar.attenuation.note}</p>}
         <Walls scene={scene} shown={shown} />
         <h2>How it was made</h2>
         <p>

@@ -479,6 +479,7 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
             heart={shown.heart}
             title={other?.polar ? "Shown fit" : "Polar map"}
           />
+          {shown.report?.polar?.attenuation && <p class="quiet">{shown.report.polar.attenuation.note}</p>}
           {other?.polar && other.heart && (
             <details open>
               <summary>

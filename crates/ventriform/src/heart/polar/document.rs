@@ -1,5 +1,6 @@
 //! The polar map as it is written in `polar.json` and summed up in reports, and maps of other figures.
 
+use super::attenuation::PolarAttenuation;
 use super::figure::{FigureMap, WallFigure};
 use super::picture::rings;
 use super::{Pixel, PlaceState, PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
@@ -31,6 +32,10 @@ pub struct PolarSummary {
     pub first_column: Option<String>,
     /// The order of the columns; null if the orientation is unknown.
     pub direction: Option<String>,
+    /// What attenuation may have to do with the extent; in reports only, where nothing says that it was corrected,
+    /// no normal limits were used, and inferior wall lies below the threshold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub attenuation: Option<PolarAttenuation>,
 }
 
 /// A polar map, as in `polar.json`.
@@ -129,7 +134,7 @@ pub struct FigureSegment {
     pub mean: Option<f64>,
 }
 
-fn round(x: f64) -> f64 {
+pub(super) fn round(x: f64) -> f64 {
     (100.0 * x).round() / 100.0
 }
 
@@ -165,6 +170,7 @@ impl PolarSummary {
             orientation: map.orientation.as_str().to_owned(),
             first_column: oriented.then(|| "lateral".to_owned()),
             direction: oriented.then(|| "lateral, anterior, septal, inferior".to_owned()),
+            attenuation: None,
         }
     }
 }

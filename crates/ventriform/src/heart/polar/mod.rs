@@ -37,6 +37,7 @@
 //! with healthy people. Without attenuation correction the base, which lies deeper in the body, is 20 to
 //! 30 % below the apex in a heart of even uptake.
 
+mod attenuation;
 mod base;
 mod document;
 mod figure;
@@ -44,6 +45,7 @@ mod levels;
 mod picture;
 mod smoothing;
 
+pub use attenuation::PolarAttenuation;
 pub use document::{
     FigureDocument, FigureSegment, PolarDocument, PolarSegment, PolarSummary, PolarTerritory,
 };
@@ -607,6 +609,43 @@ pub(crate) mod tests {
         let picture = svg(&map);
         assert!(picture.contains("ORIENTATION UNKNOWN"));
         assert!(!picture.contains(">A</text>") && !picture.contains("LAD"));
+    }
+
+    #[test]
+    fn inferior_extent_is_told_where_nothing_corrected_attenuation() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        let mut summary = PolarSummary::from_map(&map);
+        for segment in &mut summary.segments {
+            segment.extent_percent = if segment.number == 4 { 40.0 } else { 10.0 };
+        }
+        let told = |corrected| summary.clone().with_attenuation(corrected).attenuation;
+        // The mean over all of the wall, of which segments 3, 4, 5, 9, 10, 11 and 15 have inferior in their names.
+        let area = |numbers: &[usize]| -> f64 {
+            let of = summary
+                .segments
+                .iter()
+                .filter(|s| numbers.contains(&s.number));
+            of.map(|s| s.area_mm2).sum()
+        };
+        let all: Vec<usize> = (1..=17).collect();
+        let below = 40.0 * area(&[4]) + 10.0 * area(&[3, 5, 9, 10, 11, 15]);
+        let expected = below / area(&all);
+        for (corrected, said) in [(None, "Nothing says"), (Some(false), "was not corrected")] {
+            let told = told(corrected).unwrap();
+            assert_eq!(told.corrected, corrected);
+            let part = told.inferior_extent_percent;
+            assert!((part - expected).abs() < 0.01, "{part} of {expected}");
+            assert!(told.note.contains(said), "{}", told.note);
+        }
+        assert_eq!(told(Some(true)), None);
+        let mut even = summary.clone();
+        for segment in &mut even.segments {
+            segment.extent_percent = 0.0;
+        }
+        assert_eq!(even.with_attenuation(None).attenuation, None);
+        let unknown = PolarSummary::from_map(&map.counted_by(OrientationSource::Unknown));
+        assert_eq!(unknown.with_attenuation(None).attenuation, None);
     }
 
     #[test]

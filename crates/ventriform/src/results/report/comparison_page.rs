@@ -79,6 +79,7 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
             section {
                 h2 { "Both scans" }
                 (document::table(&scan_table(report, page.scan.is_some()), "Table of both scans"))
+                @for note in attenuation_notes(report) { p.hint { (note) } }
             }
             (particulars(report))
         },
@@ -220,6 +221,16 @@ pub(super) fn segment_table(report: &ComparisonReport) -> Table {
     let names = names.map(|segment| vec![segment.segment.to_string(), segment.name.clone()]);
     let columns = [TableColumn::number("No."), TableColumn::name("Segment")];
     figures::table(columns, &rows, names.zip(segments))
+}
+
+/// What attenuation may have to do with the extents of both scans.
+pub(super) fn attenuation_notes(report: &ComparisonReport) -> Vec<String> {
+    let scans = [("Stress", &report.stress), ("Rest", &report.rest)];
+    let notes = scans.into_iter().filter_map(|(name, scan)| {
+        let attenuation = scan.polar.as_ref()?.attenuation.as_ref()?;
+        Some(format!("{name}: {}", attenuation.note))
+    });
+    notes.collect()
 }
 
 /// The known facts of both scans, side by side. Of scans that are not `named`, the description is left out: it may say

@@ -2,8 +2,8 @@
 //! side, territories and segments.
 
 use super::comparison_page::{
-    self, MAPS_HINT, SLICES_HINT, TITLE, missing_figures, scan_table, segment_table,
-    territory_table,
+    self, MAPS_HINT, SLICES_HINT, TITLE, attenuation_notes, missing_figures, scan_table,
+    segment_table, territory_table,
 };
 use super::comparison_report::ComparisonReport;
 use super::page_parts::flags_headline;
@@ -88,6 +88,8 @@ fn pictures_and_figures(sheet: &ComparisonSheet<'_>) -> Block {
         }
     }
     facts.push(Block::Table(table));
+    let notes = attenuation_notes(report).into_iter();
+    facts.extend(notes.map(|note| Block::Sentence(Tone::Soft, note)));
     let Some(slices) = sheet.slices else {
         return Block::Columns(vec![(CONTENT_WIDTH_PX, facts)]);
     };

@@ -312,10 +312,14 @@ pub(super) fn polar_hint(report: &SegmentationReport) -> String {
              arteries"
         }
     };
+    let attenuation = polar.and_then(|polar| polar.attenuation.as_ref());
+    let attenuation = attenuation.map_or(String::new(), |attenuation| {
+        format!(" {}", attenuation.note)
+    });
     format!(
         "Polar map of the 17 segments of the American Heart Association: apex in the centre, {sides}. In per cent of \
          the hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold; grey is \
-         outside of the wall.",
+         outside of the wall.{attenuation}",
         limits_hint(report.perfusion.as_ref())
     )
 }

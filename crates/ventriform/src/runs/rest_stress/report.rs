@@ -23,6 +23,12 @@ fn scan_report(heart: &ComparedHeart, scores: Option<[Answer; 2]>) -> ComparedSc
     let model = &segmentation.fit.model;
     let scan = heart.provenance();
     let facts = heart.facts();
+    let attenuation_corrected = scan.and_then(Provenance::attenuation_corrected);
+    let limits = heart.perfusion().is_some();
+    let summary = |map| match PolarSummary::from_map(map) {
+        summary if limits => summary,
+        summary => summary.with_attenuation(attenuation_corrected),
+    };
     ComparedScan {
         template: heart.template().to_owned(),
         confidence: round(segmentation.fit.judgement.confidence),
@@ -37,10 +43,10 @@ fn scan_report(heart: &ComparedHeart, scores: Option<[Answer; 2]>) -> ComparedSc
             .as_ref()
             .map(Posture::from_orientation),
         series_description: scan.and_then(|scan| scan.series_description.clone()),
-        attenuation_corrected: scan.and_then(|scan| scan.attenuation_corrected()),
+        attenuation_corrected,
         radiopharmaceutical: scan.and_then(|scan| scan.radiopharmaceutical.clone()),
         injected_dose: scan.and_then(Provenance::injected_dose_mbq),
-        polar: heart.map().map(PolarSummary::from_map),
+        polar: heart.map().map(summary),
         perfusion: (heart.perfusion().zip(heart.map()))
             .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
         extent_interval_percent: scores.map(|[extent, _]| extent.interval.map(round)),

@@ -2,7 +2,7 @@
 
 use super::from_files::SegmentedVolume;
 use super::segment::Segmentation;
-use crate::heart::polar::PolarSummary;
+use crate::heart::polar::{PolarMap, PolarSummary};
 use crate::parameters::Parameters;
 use crate::results::report::{
     AgreementReport, AppliedReaderReport, CandidateReport, FileFacts, PerfusionReport,
@@ -34,7 +34,10 @@ impl SegmentedVolume {
                 .agreement
                 .as_ref()
                 .map(AgreementReport::from_agreement),
-            polar: segmentation.polar.as_ref().map(PolarSummary::from_map),
+            polar: segmentation
+                .polar
+                .as_ref()
+                .map(|map| self.polar_summary(map)),
             perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
                 .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
             parameters: self.parameters.to_json(),
@@ -42,6 +45,17 @@ impl SegmentedVolume {
             warnings: self.warnings(),
         };
         SegmentationReport::new(&segmentation.fit, parts)
+    }
+
+    /// The map's summary, with a note on attenuation where no normal limits stand beside it.
+    fn polar_summary(&self, map: &PolarMap) -> PolarSummary {
+        let summary = PolarSummary::from_map(map);
+        if self.perfusion.is_some() {
+            return summary;
+        }
+        let stated = self.parameters.scan.attenuation_corrected;
+        let header = self.reading.provenance.as_ref();
+        summary.with_attenuation(stated.or_else(|| header?.attenuation_corrected()))
     }
 }
 

@@ -272,6 +272,12 @@ impl<'a> DicomComparison<'a> {
             content.extend(verdicts(&scores, SCAN_FIGURES, Group::Whole));
             content.extend(verdicts(&whole, FIGURES, state));
             content.extend(own.perfusion.iter().flat_map(limits_used));
+            let attenuation = own
+                .polar
+                .as_ref()
+                .and_then(|polar| polar.attenuation.as_ref());
+            let note = attenuation.map(|it| it.note.as_str());
+            content.extend(note.map(|said| text("CONTAINS", dcm("121106", "Comment"), said)));
             groups.push(group("1501", content));
         }
         for territory in &report.territories {

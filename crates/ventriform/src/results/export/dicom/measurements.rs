@@ -157,6 +157,11 @@ fn whole(results: &DicomResults<'_>, figures: Option<&Value>) -> DataSet {
             .anatomical_interval
             .map(|_| RANGES_COMMENT);
         content.extend(ranges.map(|ranges| text("CONTAINS", comment, ranges)));
+        let attenuation = report
+            .polar
+            .as_ref()
+            .and_then(|polar| polar.attenuation.as_ref());
+        content.extend(attenuation.map(|it| text("CONTAINS", comment, &it.note)));
     }
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }

@@ -86,6 +86,7 @@ fn polar() -> PolarSummary {
         orientation: "frame".into(),
         first_column: None,
         direction: None,
+        attenuation: None,
     }
 }
 
