@@ -557,7 +557,7 @@ async fn a_cohort_becomes_limits_and_two_scans_a_scored_comparison() {
     let page = service.get(&format!("{path}/report.html")).send().await;
     let page = page.unwrap().text().await.unwrap();
     assert!(
-        page.contains("rest and stress") && page.contains("Doe^Jane"),
+        page.contains("rest and stress") && page.contains("Doe, Jane"),
         "whose it is"
     );
     assert_eq!(page.matches("data:image/svg+xml").count(), 7);

@@ -12,25 +12,27 @@ pub(super) fn section(scan: Option<&Provenance>) -> Markup {
         return html! {};
     };
     let undecoded = scan.undecoded.join(", ");
+    let name = |name: &Option<String>| name.as_deref().map(person);
+    let date = |date: &Option<String>| date.as_deref().map(day);
     let tables = [
         (
             "Patient",
             json!({
-                "name": scan.patient_name,
+                "name": name(&scan.patient_name),
                 "ID": scan.patient_id,
-                "birth date": scan.patient_birth_date,
+                "birth date": date(&scan.patient_birth_date),
                 "sex": scan.patient_sex,
             }),
         ),
         (
             "Study",
             json!({
-                "date": scan.study_date,
-                "time": scan.study_time,
+                "date": date(&scan.study_date),
+                "time": scan.study_time.as_deref().map(clock_time),
                 "description": scan.study_description,
                 "study ID": scan.study_id,
                 "accession number": scan.accession_number,
-                "referring physician": scan.referring_physician,
+                "referring physician": name(&scan.referring_physician),
                 "UID": scan.study_uid,
             }),
         ),
@@ -163,6 +165,16 @@ fn day(date: &str) -> String {
     }
 }
 
+/// A time (`HHMMSS.FFFFFF`, as far as it is stated) to the minute; any other text as it is.
+fn clock_time(time: &str) -> String {
+    match time.as_bytes() {
+        [a, b, c, d, ..] if [a, b, c, d].iter().all(|byte| byte.is_ascii_digit()) => {
+            format!("{}:{}", &time[..2], &time[2..4])
+        }
+        _ => time.to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,15 +185,17 @@ mod tests {
             patient_name: Some("Doe^<Jane>".into()),
             patient_id: Some("4711".into()),
             study_date: Some("20260101".into()),
+            study_time: Some("091233.5".into()),
             series_uid: Some("1.2.3".into()),
             undecoded: vec!["referring_physician".into()],
             ..Provenance::default()
         };
         let page = section(Some(&scan)).into_string();
         for shown in [
-            "Doe^&lt;Jane&gt;",
+            "Doe, &lt;Jane&gt;",
             "4711",
-            "20260101",
+            "2026-01-01",
+            "09:12",
             "1.2.3",
             "referring_physician",
         ] {
