@@ -43,8 +43,8 @@ function Page() {
           <a href={at("/#/limits")} aria-current={view === "limits" && !DOCS ? "page" : undefined}>
             Normal limits
           </a>
-          <a href={at("/#/evaluation")} aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>
-            Evaluation
+          <a href={at("/#/glossary")} aria-current={view === "glossary" && !DOCS ? "page" : undefined}>
+            Glossary
           </a>
           <a href={at("/docs")} aria-current={DOCS ? "page" : undefined}>
             API
@@ -77,8 +77,15 @@ function Page() {
           <Chunk key="limits" load={limits} name="normal limits" />
         ) : view === "evaluation" ? (
           <Chunk key="evaluation" load={evaluation} name="evaluation" />
+        ) : view === "glossary" ? (
+          <Chunk key="glossary" load={glossary} name="glossary" />
         ) : (
-          <WorkList />
+          <>
+            <WorkList />
+            <p class="pad quiet">
+              For researchers: <a href={at("/#/evaluation")}>Evaluation of a cohort</a>
+            </p>
+          </>
         )}
       </main>
     </>
@@ -121,6 +128,7 @@ const comparison = () =>
 const limits = () => import("./limits").then(module => module.LimitsView as ComponentType<{ volume?: string }>);
 const evaluation = () =>
   import("./evaluationview").then(module => module.EvaluationView as ComponentType<{ volume?: string }>);
+const glossary = () => import("./glossary").then(module => module.Glossary as ComponentType<{ volume?: string }>);
 const docs = () => import("./docs").then(module => module.Docs as ComponentType<{ volume?: string }>);
 
 /** Viewer and documentation are fetched when they are opened first. */

@@ -120,14 +120,25 @@ export function valuesOf(draft: Draft, all: Spec[]): Record<string, ParameterVal
   for (const { name, schema } of all) {
     const text = draft[name]?.trim();
     if (!text) continue;
-    if (schema.type === "array")
-      values[name] = text.split(/[\s,;]+/).map(part => (Number.isFinite(Number(part)) ? Number(part) : part));
-    else if (schema.type === "integer" || schema.type === "number")
-      values[name] = Number.isFinite(Number(text)) ? Number(text) : text;
+    if (schema.type === "array") values[name] = partsOf(text).map(numberOr);
+    else if (schema.type === "integer" || schema.type === "number") values[name] = numberOr(text);
     else if (schema.type === "boolean") values[name] = text === "true";
     else values[name] = text;
   }
   return values;
+}
+
+/** The numbers of a list. With semicolons between them, or nothing but blanks, a comma in a number is a decimal comma. */
+function partsOf(text: string): string[] {
+  if (text.includes(";")) return text.split(/\s*;\s*/).filter(Boolean);
+  const words = text.split(/\s+/);
+  return words.length > 1 && words.every(word => !word.endsWith(",")) ? words : text.split(/[\s,]+/);
+}
+
+/** The number that a person has written, with a decimal point or comma; else the text, for the service to refuse. */
+function numberOr(text: string): number | string {
+  const number = Number(text.replace(/^([+-]?\d*),(\d+)$/, "$1.$2"));
+  return Number.isFinite(number) ? number : text;
 }
 
 /** The draft that repeats the parameters of a job or result: only what differs from the defaults. */

@@ -1,11 +1,12 @@
 // The address of the view: #/ is the list, #/evaluation the results of an evaluation, #/limits the normal limits,
+// #/glossary what each figure is,
 // #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is shown beside, #/comparison/ID the comparison of
 // rest and stress with that id, or the job that makes it.
 
 import { Watched } from "./state";
 
 export interface Route {
-  view: "list" | "scan" | "evaluation" | "limits" | "comparison";
+  view: "list" | "scan" | "evaluation" | "limits" | "glossary" | "comparison";
   volume: string | null;
   result: string | null;
   other: string | null;
@@ -15,7 +16,8 @@ function read(): Route {
   const [, view, volume, result, other] = location.hash.split("/");
   if (view === "scan" && volume) return { view, volume, result: result || null, other: other || null };
   if (view === "comparison" && volume) return { view, volume: null, result: volume, other: null };
-  return { view: view === "evaluation" || view === "limits" ? view : "list", volume: null, result: null, other: null };
+  const named = view === "evaluation" || view === "limits" || view === "glossary" ? view : "list";
+  return { view: named, volume: null, result: null, other: null };
 }
 
 export const route = new Watched<Route>(read());

@@ -85,15 +85,26 @@ export async function loadComparison(result: Result): Promise<Compared> {
   return { result, report, stress, rest, difference };
 }
 
-/**
- * Slices of a kind, as many as in the service's picture of both scans (`runs/rest_stress/slices.rs`), at the same levels.
- */
-export const SLICES = 8;
-/** Shares of the long axis, from the apex, at which the first and the last short-axis slice lie. */
-const SHORT_ENDS_SHARE = [0.06, 0.94] as const;
-/** Distance from the long axis of the outermost long-axis slices, as a share of its length. */
-const LONG_ENDS_SHARE = 0.28;
-/** Millimetres that a slice shows, as in that picture. */
+/** A row of slices of one kind. */
+export interface Row {
+  /** Slices beside each other. */
+  count: number;
+  /**
+   * Where the first and the last one lie: of the short axis the share of the long axis from the apex on, of the others
+   * the distance from the long axis as a share of its length.
+   */
+  ends: [number, number];
+  /** Millimetres by which the slices of rest are moved along the row. */
+  restShift: number;
+}
+
+/** The rows of the service's picture of both scans (`runs/rest_stress/slices.rs`), in the order of `KINDS`. */
+export const STANDARD_ROWS: Row[] = [
+  { count: 8, ends: [0.06, 0.94], restShift: 0 },
+  { count: 8, ends: [-0.28, 0.28], restShift: 0 },
+  { count: 8, ends: [-0.28, 0.28], restShift: 0 },
+];
+/** Millimetres that a slice shows at first, as in that picture. */
 export const SLICE_MM = 114.4;
 
 export interface SliceKind {
@@ -109,27 +120,28 @@ export const KINDS: SliceKind[] = [
   { name: "Horizontal long axis", short: "HLA", way: "inferior to anterior wall" },
 ];
 
-/** The plane of a kind of slices, and the place in the middle of one of them. */
-export function sliceAt(heart: Axis, kind: number, number: number): { plane: Plane; origin: Vec } {
-  const { anterior, lateral, length, middle } = frameOf(heart);
+/** The plane of a slice of a row, and the place in its middle. */
+export function sliceAt(
+  { heart, scan }: { heart: Axis; scan: WhichScan },
+  kind: number,
+  number: number,
+  rows: Row[],
+): { plane: Plane; origin: Vec } {
+  const { length, middle } = frameOf(heart);
   const [short, horizontal, vertical] = heartPlanes(heart) as [Plane, Plane, Plane];
-  const share = number / (SLICES - 1);
-  if (kind === 0) {
-    const along = SHORT_ENDS_SHARE[0] + (SHORT_ENDS_SHARE[1] - SHORT_ENDS_SHARE[0]) * share;
-    return { plane: short, origin: mix(heart.apex, heart.base, along) };
-  }
-  const aside = (2 * share - 1) * LONG_ENDS_SHARE * length;
-  return {
-    plane: kind === 1 ? vertical : horizontal,
-    origin: add(middle, scale(kind === 1 ? lateral : anterior, aside)),
-  };
+  const { count, ends, restShift } = rows[kind]!;
+  const at = ends[0] + ((ends[1] - ends[0]) * number) / Math.max(1, count - 1);
+  const shift = scan === "rest" ? restShift : 0;
+  if (kind === 0)
+    return { plane: short, origin: add(mix(heart.apex, heart.base, at), scale(short.normal, -shift)) };
+  const plane = kind === 1 ? vertical : horizontal;
+  return { plane, origin: add(middle, scale(plane.normal, at * length + shift)) };
 }
 
 /** Millimetres between neighbouring slices of a kind. */
-export function spacingOf(heart: Axis, kind: number): number {
-  const { length } = frameOf(heart);
-  const share = kind === 0 ? SHORT_ENDS_SHARE[1] - SHORT_ENDS_SHARE[0] : 2 * LONG_ENDS_SHARE;
-  return (share * length) / (SLICES - 1);
+export function spacingOf(heart: Axis, kind: number, rows: Row[]): number {
+  const { count, ends } = rows[kind]!;
+  return (Math.abs(ends[1] - ends[0]) * frameOf(heart).length) / Math.max(1, count - 1);
 }
 
 /** The lines of a heart's polar map on its wall. */

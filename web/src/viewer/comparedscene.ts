@@ -1,19 +1,28 @@
-// What the views of a comparison share: colours, the chosen slice, the cursor on both walls, from where the walls are
-// seen.
+// What the views of a comparison share: colours, window, rows of slices, the chosen slice, the cursor on both walls, from
+// where the walls are seen.
 
 import { Watched } from "../state";
 import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";
+import { type Row, SLICE_MM, STANDARD_ROWS } from "./compared";
 import type { PolarLabels } from "./polar";
 import { type Vec, unit } from "./vector";
 
 /** What is written on the segments of the polar maps of uptake. */
 export type Written = PolarLabels | "scores";
 
+/** What counts as 100 per cent in the slices. */
+export type Normalisation = "wall" | "image" | "slice";
+
 export class ComparedScene {
   /** Colours of the uptake in slices, polar maps and walls. */
   readonly lut = new Watched<Lut>(kept(WALL_LUT, UPTAKE) ?? LUTS[UPTAKE]!);
-  /** Uptake in slices that has the last colour, per cent of each scan's own reference. */
-  readonly brightest = new Watched<number>(100);
+  readonly normalisation = new Watched<Normalisation>("wall");
+  /** Uptake in slices that has the first and the last colour, per cent. */
+  readonly window = new Watched<[number, number]>([0, 100]);
+  /** The rows of slices, in the order of `KINDS`. */
+  readonly rows = new Watched<Row[]>(STANDARD_ROWS);
+  /** Millimetres that a slice shows. */
+  readonly across = new Watched<number>(SLICE_MM);
   readonly smooth = new Watched<boolean>(true);
   readonly contours = new Watched<boolean>(false);
   /** The slice of both scans that is marked and shown large. */
@@ -28,7 +37,10 @@ export class ComparedScene {
   watch(act: () => void): () => void {
     const all: { watch(act: () => void): () => void }[] = [
       this.lut,
-      this.brightest,
+      this.normalisation,
+      this.window,
+      this.rows,
+      this.across,
       this.smooth,
       this.contours,
       this.chosen,
@@ -36,6 +48,14 @@ export class ComparedScene {
     ];
     const ends = all.map(watched => watched.watch(act));
     return () => ends.forEach(end => end());
+  }
+
+  /** Changes the row of the marked slice, which stays within it. */
+  changeRow(change: Partial<Row>): void {
+    const { kind, number } = this.chosen.value;
+    this.rows.value = this.rows.value.map((row, at) => (at === kind ? { ...row, ...change } : row));
+    const last = this.rows.value[kind]!.count - 1;
+    if (number > last) this.chosen.value = { kind, number: last };
   }
 }
 

@@ -6,17 +6,16 @@ import {
   type Compared,
   type ComparedHeart,
   KINDS,
-  SLICES,
-  SLICE_MM,
+  type Row,
   sliceAt,
   spacingOf,
   wallFrameOf,
 } from "./compared";
 import type { ComparedScene } from "./comparedscene";
-import { contours, label, paintVoxels } from "./drawing";
+import { type Look, brightestOf, contours, label, paintVoxels } from "./drawing";
+import { type Plane, point } from "./plane";
 import { placeOnMap, onMap } from "./polar";
 import { type Vec, dot, sub } from "./vector";
-import { point } from "./plane";
 
 /** CSS pixels left of the slices for the name of the scan, and above each kind for its own. */
 const [ASIDE, ABOVE] = [46, 19];
@@ -30,11 +29,12 @@ export interface Laid {
   height: number;
 }
 
-/** Where the cells lie in a picture of this size. */
-export function laid(width: number, height: number): Laid {
+/** Where the cells of `rows` lie in a picture of this size. */
+export function laid(width: number, height: number, rows: Row[]): Laid {
   const aside = width < 500 ? 38 : ASIDE;
-  const cell = Math.max(8, Math.min((width - aside) / SLICES, (height - 3 * ABOVE) / 6));
-  const left = aside + Math.max(0, (width - aside - SLICES * cell) / 2);
+  const most = Math.max(...rows.map(row => row.count));
+  const cell = Math.max(8, Math.min((width - aside) / most, (height - 3 * ABOVE) / 6));
+  const left = aside + Math.max(0, (width - aside - most * cell) / 2);
   const top = (kind: number, row: number) => (kind + 1) * ABOVE + (2 * kind + row) * cell;
   return { cell, left, top, height: 3 * ABOVE + 6 * cell };
 }
@@ -46,16 +46,16 @@ function cursorPlace(one: ComparedHeart, cursor: [number, number] | null): Vec |
   return frame && place ? frame.at(...place) : null;
 }
 
-/** Per cent of each scan's own reference, in which both are shown. */
-function look(one: ComparedHeart, scene: Pick<ComparedScene, "lut" | "brightest" | "smooth">) {
-  const reference = one.polar?.reference ?? one.report.polar?.reference ?? one.region?.highest ?? 1;
-  return {
-    voxels: one.region!,
-    lut: scene.lut.value,
-    low: 0,
-    high: (reference * scene.brightest.value) / 100,
-    smooth: scene.smooth.value,
-  };
+/** How a slice of a scan is painted: `window` in per cent of its wall, its whole image, or the slice itself. */
+function lookAt(one: ComparedHeart, scene: ComparedScene, plane: Plane, origin: Vec): Look {
+  const voxels = one.region!;
+  const full = {
+    wall: () => one.polar?.reference ?? one.report.polar?.reference ?? voxels.highest,
+    image: () => voxels.highest,
+    slice: () => brightestOf(voxels, plane, origin, scene.across.value),
+  }[scene.normalisation.value]();
+  const [low, high] = scene.window.value.map(percent => (full * percent) / 100) as [number, number];
+  return { voxels, lut: scene.lut.value, low, high, smooth: scene.smooth.value };
 }
 
 export interface SlicesStyle {
@@ -77,8 +77,10 @@ export function drawSlices(
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.fillStyle = GROUND;
   context.fillRect(0, 0, width, height);
-  const { cell, left, top } = laid(width, height);
-  const factor = cell / SLICE_MM;
+  const rows = scene.rows.value;
+  const across = scene.across.value;
+  const { cell, left, top } = laid(width, height, rows);
+  const factor = cell / across;
   const small = width < 500;
   for (const [kind, { name, short, way }] of KINDS.entries()) {
     label(
@@ -94,16 +96,15 @@ export function drawSlices(
       const y = top(kind, row);
       label(context, row === 0 ? "Stress" : "Rest", left - 5, y + cell / 2, "right", small ? 9 : 12);
       if (!heart || !region) continue;
-      const seen = look(one, scene);
       const place = marks ? cursorPlace(one, scene.cursor.value) : null;
-      for (let n = 0; n < SLICES; n++) {
-        const { plane, origin } = sliceAt(heart, kind, n);
+      for (let n = 0; n < rows[kind]!.count; n++) {
+        const { plane, origin } = sliceAt({ heart, scan: one.scan }, kind, n, rows);
         const box = { x: left + n * cell + 0.5, y: y + 0.5, width: cell - 1, height: cell - 1 };
         context.save();
         context.beginPath();
         context.rect(box.x, box.y, box.width, box.height);
         context.clip();
-        paintVoxels(context, seen, plane, origin, box, factor);
+        paintVoxels(context, lookAt(one, scene, plane, origin), plane, origin, box, factor);
         context.translate(box.x + box.width / 2, box.y + box.height / 2);
         if (scene.contours.value)
           contours(
@@ -112,9 +113,9 @@ export function drawSlices(
             plane,
             origin,
             factor,
-            SLICE_MM / 2,
+            across / 2,
           );
-        if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(heart, kind) / 2) {
+        if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(heart, kind, rows) / 2) {
           const from = sub(place, origin);
           ring(context, dot(from, plane.right) * factor, dot(from, plane.down) * factor, Math.max(3, cell / 22));
         }
@@ -153,12 +154,13 @@ function goTo(
 ): void {
   const frame = wallFrameOf(one);
   if (!one.heart || !one.polar || !frame) return;
-  const { plane, origin } = sliceAt(one.heart, kind, number);
+  const { plane, origin } = sliceAt({ heart: one.heart, scan: one.scan }, kind, number, scene.rows.value);
   scene.cursor.value = onMap(one.polar, ...frame.place(point(plane, origin, right, down)));
 }
 
 export function ComparedSlices({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
   const { kind, number } = useWatched(scene.chosen);
+  const rows = useWatched(scene.rows);
   const draw = (element: HTMLCanvasElement) =>
     drawSlices(element, compared, scene, {
       width: element.clientWidth,
@@ -169,25 +171,24 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
   const { canvas } = useCanvas(draw, act => scene.watch(act), compared);
   const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
     const { clientWidth: width, clientHeight: height } = event.currentTarget;
-    const { cell, left, top } = laid(width, height);
+    const { cell, left, top } = laid(width, height, rows);
     const n = Math.floor((event.offsetX - left) / cell);
-    if (n < 0 || n >= SLICES) return;
     for (const at of KINDS.keys()) {
+      if (n < 0 || n >= rows[at]!.count) continue;
       for (const [row, one] of [compared.stress, compared.rest].entries()) {
         const [x, y] = [event.offsetX - left - (n + 0.5) * cell, event.offsetY - top(at, row) - cell / 2];
         if (Math.abs(y) > cell / 2) continue;
         scene.chosen.value = { kind: at, number: n };
-        goTo(scene, one, at, n, (x * SLICE_MM) / cell, (y * SLICE_MM) / cell);
+        const mm = scene.across.value / cell;
+        goTo(scene, one, at, n, x * mm, y * mm);
         return;
       }
     }
   };
   const move = (along: number, over: number) => {
-    const next = {
-      kind: Math.max(0, Math.min(KINDS.length - 1, kind + over)),
-      number: Math.max(0, Math.min(SLICES - 1, number + along)),
-    };
-    scene.chosen.value = next;
+    const next = Math.max(0, Math.min(KINDS.length - 1, kind + over));
+    const last = rows[next]!.count - 1;
+    scene.chosen.value = { kind: next, number: Math.max(0, Math.min(last, number + along)) };
   };
   return (
     <canvas
@@ -197,9 +198,9 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
       role="slider"
       aria-label="Slices of stress above those of rest; arrow keys choose a level"
       aria-valuemin={1}
-      aria-valuemax={KINDS.length * SLICES}
-      aria-valuenow={kind * SLICES + number + 1}
-      aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${SLICES}`}
+      aria-valuemax={rows.reduce((sum, row) => sum + row.count, 0)}
+      aria-valuenow={rows.slice(0, kind).reduce((sum, row) => sum + row.count, 0) + number + 1}
+      aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
       onPointerDown={press}
       onKeyDown={event => {
         const by: Record<string, [number, number]> = {
@@ -243,6 +244,7 @@ function Large({
   number: number;
 }) {
   const title = one.scan === "stress" ? "Stress" : "Rest";
+  const rows = useWatched(scene.rows);
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
     const { clientWidth: width, clientHeight: height } = element;
@@ -252,9 +254,9 @@ function Large({
     context.fillStyle = GROUND;
     context.fillRect(0, 0, width, height);
     if (!one.heart || !one.region) return;
-    const { plane, origin } = sliceAt(one.heart, kind, number);
-    const factor = Math.min(width, height) / SLICE_MM;
-    paintVoxels(context, look(one, scene), plane, origin, { x: 0, y: 0, width, height }, factor);
+    const { plane, origin } = sliceAt({ heart: one.heart, scan: one.scan }, kind, number, rows);
+    const factor = Math.min(width, height) / scene.across.value;
+    paintVoxels(context, lookAt(one, scene, plane, origin), plane, origin, { x: 0, y: 0, width, height }, factor);
     context.save();
     context.translate(width / 2, height / 2);
     if (scene.contours.value)
@@ -264,10 +266,10 @@ function Large({
         plane,
         origin,
         factor,
-        SLICE_MM,
+        scene.across.value,
       );
     const place = cursorPlace(one, scene.cursor.value);
-    if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(one.heart, kind) / 2) {
+    if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(one.heart, kind, rows) / 2) {
       const from = sub(place, origin);
       ring(context, dot(from, plane.right) * factor, dot(from, plane.down) * factor, 6);
     }
@@ -286,10 +288,10 @@ function Large({
       <canvas
         ref={canvas}
         role="img"
-        aria-label={`${title}: ${KINDS[kind]!.name}, slice ${number + 1} of ${SLICES}`}
+        aria-label={`${title}: ${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
         onPointerDown={event => {
           const { clientWidth: width, clientHeight: height } = event.currentTarget;
-          const factor = Math.min(width, height) / SLICE_MM;
+          const factor = Math.min(width, height) / scene.across.value;
           goTo(scene, one, kind, number, (event.offsetX - width / 2) / factor, (event.offsetY - height / 2) / factor);
         }}
       />

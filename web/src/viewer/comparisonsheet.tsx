@@ -4,6 +4,7 @@ import type { Volume } from "../api";
 import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
 import {
+  AttenuationNotes,
   Headlines,
   Outdated,
   LimitsUsed,
@@ -15,6 +16,7 @@ import {
 } from "./comparedfacts";
 import { drawMap, endsOf, lutOf } from "./comparedmaps";
 import type { ComparedScene } from "./comparedscene";
+import { shownAs } from "./comparedlook";
 import { drawSlices } from "./comparedslices";
 import { drawWall } from "./heartwall";
 import { Drawn, Foot, Head, RATIO } from "./sheetparts";
@@ -85,6 +87,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
           </span>
         ))}
         <SimulatedNote report={report} />
+        <AttenuationNotes report={report} />
       </div>
       <Outdated made={result} />
       <Headlines report={report} />
@@ -125,7 +128,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
         )}
       </div>
       <p class="quiet">
-        Uptake in per cent of the hottest quarter of each scan’s own wall; where stress is compared with rest, it was
+        Slices: {shownAs(scene)}. Maps: uptake in per cent of the hottest quarter of each scan’s own wall; where stress is compared with rest, it was
         scaled by {number(1 / report.scale, 2)} over {number(report.matched_percent, 0, "%")} of the wall. Comparison{" "}
         <code>{result.id}</code>; stress <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
       </p>

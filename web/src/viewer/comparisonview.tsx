@@ -23,7 +23,9 @@ import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
 import {
+  AttenuationNotes,
   BeatTable,
+  BothMeasures,
   Headlines,
   Outdated,
   LimitsUsed,
@@ -37,6 +39,7 @@ import {
   areNotComparable,
   madeWith,
 } from "./comparedfacts";
+import { RowsOfSlices, WindowOfSlices } from "./comparedlook";
 import { ComparedMaps, lutOf } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
@@ -199,7 +202,9 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <Outdated made={compared.result} />
         {areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Headlines report={compared.report} />
+        <BothMeasures report={compared.report} />
         <SimulatedNote report={compared.report} />
+        <AttenuationNotes report={compared.report} />
         {!areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Particulars compared={compared} />
         <Downloads result={compared.result} volume={scans.stress} />
@@ -365,25 +370,13 @@ function Again({ result }: { result: Result }) {
 function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedScene; name: string }) {
   const stage = useRef<HTMLElement>(null);
   const [below, setBelow] = useState<"walls" | "slices">("walls");
-  const brightest = useWatched(scene.brightest);
+  const [rows, setRows] = useState(false);
   const outlined = useWatched(scene.contours);
   const smooth = useWatched(scene.smooth);
-  const lut = useWatched(scene.lut);
   return (
     <section class="pictures compared-stage" aria-label="Slices and walls" ref={stage}>
       <div class="toolbar" role="toolbar" aria-label="How to look">
-        <label class="inline brightness">
-          <ColourBar lut={lut} low="0" high={`${brightest}\u2009%`} />
-          <input
-            type="range"
-            aria-label="Uptake of the brightest colour, per cent"
-            min={40}
-            max={160}
-            step={5}
-            value={brightest}
-            onInput={event => (scene.brightest.value = Number(event.currentTarget.value))}
-          />
-        </label>
+        <WindowOfSlices scene={scene} />
         <label class="inline">
           <input
             type="checkbox"
@@ -400,6 +393,9 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
           />{" "}
           smooth
         </label>
+        <button type="button" class="plain" aria-expanded={rows} onClick={() => setRows(!rows)}>
+          Rows …
+        </button>
         <span class="end">
           <span class="choice" role="group" aria-label="Below the slices">
             <button type="button" aria-pressed={below === "walls"} onClick={() => setBelow("walls")}>
@@ -421,6 +417,7 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
           </button>
         </span>
       </div>
+      {rows && <RowsOfSlices scene={scene} />}
       <ComparedSlices compared={compared} scene={scene} />
       <div class="below">
         {below === "walls" ? (

@@ -3,6 +3,7 @@
 import { counts } from "../words";
 import type { Lut } from "./colours";
 import { outline } from "./mesh";
+import { smooth as smoothSurface } from "./smooth";
 import { type Plane, letters, point } from "./plane";
 import type { Layer, Scene } from "./scene";
 import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
@@ -33,6 +34,13 @@ function sample(voxels: Voxels, plane: Plane, origin: Vec, nx: number, ny: numbe
     voxels.line(start, right, nx, out, y * nx);
   }
   return out;
+}
+
+/** The brightest place of a slice, within a square of `across` millimetres about `origin`; 0 where none is brighter. */
+export function brightestOf(voxels: Voxels, plane: Plane, origin: Vec, across: number): number {
+  const n = Math.max(2, Math.ceil(across / voxels.spacing));
+  // What lies outside of the voxels is no number, and no place is brighter than it.
+  return sample(voxels, plane, origin, n, n, across / n).reduce((most, value) => (value > most ? value : most), 0);
 }
 
 const scratch = document.createElement("canvas");
@@ -156,7 +164,7 @@ export function contours(
   for (const layer of layers) {
     if (!layer.shown) continue;
     const ends = layer.mesh
-      ? outline(layer.mesh, plane, origin)
+      ? outline(smoothSurface(layer.mesh), plane, origin)
       : layer.mask
         ? marched(layer.mask, plane, origin, reach)
         : null;

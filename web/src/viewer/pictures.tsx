@@ -59,9 +59,19 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
     }
     if (!shown && scene.view.value.width === 0) scene.view.value = { width: 260, middle: null };
   }, [scene, shown, other]);
+  const gates = useWatched(scene.gates);
+  useEffect(() => {
+    const walls = shown?.gates;
+    if (!walls || walls.length !== gates.length) return;
+    const brightest = walls.map((wall, n) => (gates[n] ? Math.max(...uptake(gates[n], wall)) : NaN));
+    const share = Math.max(...brightest) / Math.max(...uptake(scene.still, shown.mesh));
+    if (share > 0) scene.gateShare.value = share;
+  }, [scene, shown, gates]);
   const aligned = heart && heartAligned;
   const planes = useMemo(() => (aligned ? heartPlanes(heart) : PATIENT), [aligned, heart]);
-  const short = useMemo(() => (heart ? heartPlanes(heart)[0]! : null), [heart]);
+  const [rowPlane, setRowPlane] = useState(0);
+  const rows = useMemo(() => (heart ? heartPlanes(heart) : []), [heart]);
+  const row = rows[rowPlane];
   const toggle = (name: string) =>
     (scene.layers.value = layers.map(layer => (layer.name === name ? { ...layer, shown: !layer.shown } : layer)));
   const masks =
@@ -234,7 +244,23 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
             <div class="off">{empty}</div>
           ))}
       </div>
-      {short && <Stack scene={scene} plane={short} />}
+      {row && (
+        <div class="row-of-slices">
+          <span class="choice" role="group" aria-label="Row of slices">
+            {rows.map((plane, n) => (
+              <button
+                key={plane.short}
+                type="button"
+                aria-pressed={n === rowPlane}
+                title={plane.name}
+                onClick={() => setRowPlane(n)}>
+                {plane.short}
+              </button>
+            ))}
+          </span>
+          <Stack scene={scene} plane={row} />
+        </div>
+      )}
     </div>
   );
 }

@@ -73,6 +73,8 @@ export class Scene {
   readonly held = new Watched<number>(0);
   /** The voxels of the gates, as far as they were read. */
   readonly gates = new Watched<(Voxels | null)[]>([]);
+  /** The brightest place of the wall in any gate, over that of all gates together; null until all gates were read. */
+  readonly gateShare = new Watched<number | null>(null);
 
   /** `still` are the voxels that are shown where no gate is. */
   constructor(
@@ -98,6 +100,7 @@ export class Scene {
       this.layers,
       this.gate,
       this.gates,
+      this.gateShare,
       this.heart,
       this.edit,
       this.tool,
@@ -113,10 +116,13 @@ export class Scene {
     return gateAt(this.gates.value, this.gate.value) ?? this.still;
   }
 
-  /** The window for what is shown: a gate holds its share of the counts of the whole beat. */
+  /**
+   * The window for what is shown. A gate holds its share of the counts of the whole beat; the thick wall of end systole,
+   * which is the brightest, has the last colour.
+   */
   get windowNow(): Window {
     const { low, high } = this.window.value;
-    const share = this.voxels === this.still ? 1 : 1 / this.gates.value.length;
+    const share = this.voxels === this.still ? 1 : (this.gateShare.value ?? 1 / this.gates.value.length);
     return { low: low * share, high: high * share };
   }
 

@@ -1,4 +1,4 @@
-// The short axis from apex to base as a row of small slices; a click takes the cursor there.
+// One axis of the heart as a row of small slices, such as the short axis from apex to base; a click takes the cursor there.
 
 import { useCanvas } from "./canvas";
 import { type SliceStyle, contours, label, paint } from "./drawing";
@@ -11,16 +11,29 @@ interface Props {
   plane: Plane;
 }
 
-/** Places along the axis, apex first, and how many of them fit. */
-function places(scene: Scene, width: number, height: number): Vec[] {
+/** Half of the way across the heart that rows of long-axis slices show, as a share of its length. */
+const LONG_ENDS_SHARE = 0.4;
+
+/** Places in the middle of as many slices as fit: of the short axis from the apex on. */
+function places(scene: Scene, plane: Plane, width: number, height: number): Vec[] {
   const heart = scene.heart.value;
   if (!heart) return [];
-  const { axis, length } = frameOf(heart);
+  const { axis, length, middle } = frameOf(heart);
   const count = Math.max(4, Math.min(14, Math.round(width / height)));
+  const isShort = plane.short === "SA";
   return Array.from({ length: count }, (_, n) => {
-    const way = length * (0.04 + (0.98 * n) / (count - 1));
-    return add(heart.apex, scale(axis, -way));
+    const share = n / (count - 1);
+    return isShort
+      ? add(heart.apex, scale(axis, -length * (0.04 + 0.98 * share)))
+      : add(middle, scale(plane.normal, length * LONG_ENDS_SHARE * (2 * share - 1)));
   });
+}
+
+/** What lies before the first slice of a row, and beyond the last one; nothing where the sides are unknown. */
+function endsOf({ short, sides }: Plane): [string, string] {
+  if (short === "SA") return ["Apex", "Base"];
+  if (!sides) return ["", ""];
+  return short === "HLA" ? ["Inf", "Ant"] : ["Sept", "Lat"];
 }
 
 export function Stack({ scene, plane }: Props) {
@@ -29,13 +42,13 @@ export function Stack({ scene, plane }: Props) {
     const count = drawStack(element, scene, plane, { width, height, ratio: element.width / width, cursor: true });
     element.setAttribute("aria-valuemin", "1");
     element.setAttribute("aria-valuemax", String(count));
-    element.setAttribute("aria-valuenow", String(nearest(scene, places(scene, width, height), plane) + 1));
+    element.setAttribute("aria-valuenow", String(nearest(scene, places(scene, plane, width, height), plane) + 1));
   };
   const { canvas } = useCanvas(draw, act => scene.watch(act), scene);
   const go = (by: number) => {
     const element = canvas.current;
     if (!element) return;
-    const all = places(scene, element.clientWidth, element.clientHeight);
+    const all = places(scene, plane, element.clientWidth, element.clientHeight);
     const now = nearest(scene, all, plane);
     const to = all[Math.max(0, Math.min(all.length - 1, now + by))];
     if (to) moveTo(scene, to, plane);
@@ -46,11 +59,11 @@ export function Stack({ scene, plane }: Props) {
       class="stack"
       tabIndex={0}
       role="slider"
-      aria-label="Short-axis slices from apex to base"
+      aria-label={`Slices of the ${plane.name.toLowerCase()}`}
       aria-valuenow={0}
       onClick={event => {
         const element = event.currentTarget;
-        const all = places(scene, element.clientWidth, element.clientHeight);
+        const all = places(scene, plane, element.clientWidth, element.clientHeight);
         const to = all[Math.floor((event.offsetX / element.clientWidth) * all.length)];
         if (to) moveTo(scene, to, plane);
       }}
@@ -82,7 +95,7 @@ export function drawStack(
   { width, height, ratio, cursor }: Omit<SliceStyle, "letters">,
 ): number {
   const context = element.getContext("2d");
-  const all = places(scene, width, height);
+  const all = places(scene, plane, width, height);
   if (!context || all.length === 0) return 0;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.fillStyle = "#0a0e11";
@@ -107,7 +120,8 @@ export function drawStack(
       context.strokeRect(box.x + 1, 1, box.width - 2, height - 2);
     }
   });
-  label(context, "Apex", 6, 10, "left", 11);
-  label(context, "Base", width - 6, 10, "right", 11);
+  const [first, last] = endsOf(plane);
+  label(context, first, 6, 10, "left", 11);
+  label(context, last, width - 6, 10, "right", 11);
   return all.length;
 }
