@@ -266,13 +266,17 @@ macro_rules! contracts {
         mod on_sqlite {
             $(#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
             async fn $name() {
-                super::$name(&super::Stores::sqlite().await).await;
+                let on = super::Stores::sqlite().await;
+                super::$name(&on).await;
+                super::totals_are_sums(&on).await;
             })+
         }
         mod on_postgres {
             $(#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
             async fn $name() {
-                super::$name(&super::Stores::postgres().await).await;
+                let on = super::Stores::postgres().await;
+                super::$name(&on).await;
+                super::totals_are_sums(&on).await;
             })+
         }
     };
@@ -311,9 +315,16 @@ contracts!(
     figures_are_counted,
     changes_and_their_rows_are_one,
     everything_stored_counts_for_its_tenant,
+    totals_follow_every_change_of_a_row,
     a_full_queue_and_a_full_intake_keep_a_share_for_others,
     work_items_are_read_in_batches_of_few_bytes,
 );
+
+/// Whatever a test has done, quotas are judged by what is stored.
+async fn totals_are_sums(on: &Stores) {
+    let wrong = on.a.wrong_totals().await.unwrap();
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
 
 async fn a_lost_lease_writes_nothing(on: &Stores) {
     let volume = on.volume(&tenant()).await;
@@ -2764,7 +2775,7 @@ async fn figures_are_counted(on: &Stores) {
 
 // ------------------------------------------------------------------------------ PostgreSQL alone
 
-/// Tables and columns of a schema, without those of the engine and of the migrations.
+/// Tables, views and columns of a schema, without those of the engine and of the migrations.
 fn columns(rows: Vec<(String, String)>) -> BTreeSet<(String, String)> {
     let own = |table: &str| !table.starts_with("sqlite_") && !table.starts_with("_sqlx");
     rows.into_iter().filter(|(table, _)| own(table)).collect()
@@ -2779,7 +2790,7 @@ async fn both_engines_have_the_same_tables() {
     let mut connection = options.filename(path).connect().await.unwrap();
     let sqlite = sqlx::query_as(
         "SELECT t.name, c.name FROM sqlite_schema AS t, pragma_table_xinfo(t.name) AS c
-         WHERE t.type = 'table'",
+         WHERE t.type IN ('table', 'view')",
     );
     let sqlite = columns(sqlite.fetch_all(&mut connection).await.unwrap());
     let mut connection = sqlx::PgConnection::connect(&on_server.url.unwrap())
@@ -3022,6 +3033,70 @@ async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
         );
         store.check().await.unwrap();
     }
+}
+
+/// Changes of rows in every table that counts, in orders that the service has only after a loss: content that comes
+/// after its owners or goes before them, and rows that change their tenant.
+const CHANGES_OF_ROWS: [&str; 32] = [
+    "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at)
+     VALUES ('ta', 'vol_1', 'volume', 1, 1), ('tb', 'vol_1', 'volume', 1, 1)",
+    "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES ('vol_1', 1, 100, '[]', '{}')",
+    "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES ('vol_1', 1, 7, '[]', '{}')
+     ON CONFLICT (id) DO UPDATE SET files = excluded.files",
+    "UPDATE volumes SET bytes = 250 WHERE id = 'vol_1'",
+    "INSERT INTO products (id, kind, created_at, parameters, summary, software, files)
+     VALUES ('mdl_1', 'model', 1, '{}', '{}', '', '[{\"bytes\": 30, \"place\": \"1\"}]'),
+            ('tpl_1', 'template', 1, '{}', '{}', '', '[]')",
+    "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at)
+     VALUES ('ta', 'mdl_1', 'model', 1, 1), ('tb', 'mdl_1', 'model', 1, 1), ('tb', 'tpl_1', 'template', 1, 1)",
+    "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at) VALUES ('ta', 'mdl_1', 'model', 1, 1)
+     ON CONFLICT (tenant, id) DO UPDATE SET renewed_at = 2",
+    "UPDATE products SET files = '[{\"bytes\": 3, \"place\": \"1\"}, {\"bytes\": 4, \"place\": \"2\"}]'",
+    "UPDATE holdings SET tenant = 'tc' WHERE tenant = 'ta'",
+    "DELETE FROM products WHERE id = 'mdl_1'",
+    "INSERT INTO products (id, kind, created_at, parameters, summary, software, files)
+     VALUES ('mdl_1', 'model', 1, '{}', '{}', '', '[{\"bytes\": 31, \"place\": \"3\"}]')
+     ON CONFLICT (id) DO NOTHING",
+    "DELETE FROM holdings WHERE id = 'mdl_1' AND tenant = 'tb'",
+    "INSERT INTO jobs (id, tenant, kind, volume, parameters, created_at, source)
+     VALUES ('job_1', 'ta', 'model', 'vol_1', '{}', 1, '{\"archive\": \"a\", \"study\": \"1.2\"}'),
+            ('job_2', 'tc', 'model', 'vol_1', '{}', 1, '{\"archive\": \"a\", \"study\": \"1.2.3\"}')",
+    "UPDATE jobs SET labels = '{\"a\": \"\u{e4}\"}', external_id = 'x' WHERE id = 'job_1'",
+    "UPDATE jobs SET state = 'running', progress = 0.5, revision = 2",
+    "UPDATE jobs SET tenant = 'tb' WHERE id = 'job_1'",
+    "DELETE FROM holdings WHERE tenant = 'tc' AND id = 'vol_1'",
+    "DELETE FROM jobs WHERE id = 'job_2'",
+    "INSERT INTO intake_groups (id, tenant, study, series, instance, image_type, protocol, sender, state,
+                                revision, created_at, changed_at)
+     VALUES ('grp_1', 'ta', '1', '2', '', '[]', 'stow-rs', '', 'gathering', 1, 1, 1)",
+    "INSERT INTO intake_objects (tenant, sop_instance, group_id, data_sha256, file_sha256, file, bytes, received_at)
+     VALUES ('ta', '1.1', 'grp_1', '', '', 'f1', 40, 1), ('ta', '1.2', 'grp_1', '', '', 'f2', 50, 1),
+            ('ta', '1.3', 'grp_1', '', '', NULL, 60, 1)",
+    "UPDATE intake_objects SET file = NULL WHERE file = 'f1'",
+    "UPDATE intake_objects SET bytes = 55 WHERE file = 'f2'",
+    "UPDATE intake_objects SET tenant = 'tb' WHERE file = 'f2'",
+    "UPDATE intake_objects SET file = 'f1' WHERE sop_instance = '1.1'",
+    "DELETE FROM intake_objects WHERE file = 'f1'",
+    "DELETE FROM intake_groups",
+    "INSERT INTO workitems (tenant, uid, state, attributes, changed_at)
+     VALUES ('ta', '1', 'SCHEDULED', '{\"a\": \"\u{e4}\"}', 1), ('tb', '1', 'SCHEDULED', '{}', 1)",
+    "UPDATE workitems SET state = 'COMPLETED', attributes = '{\"a\": 1}' WHERE tenant = 'ta'",
+    "UPDATE workitems SET tenant = 'tc' WHERE tenant = 'ta'",
+    "DELETE FROM workitems",
+    "DELETE FROM volumes",
+    "DELETE FROM products",
+];
+
+async fn totals_follow_every_change_of_a_row(on: &Stores) {
+    for change in CHANGES_OF_ROWS {
+        assert!(on.tamper(change).await, "{change}");
+        let wrong = on.a.wrong_totals().await.unwrap();
+        assert!(wrong.is_empty(), "{change}: {wrong:?}");
+    }
+    // A total that nobody keeps is noticed.
+    assert!(on.tamper("UPDATE stored_bytes SET bytes = bytes + 1").await);
+    assert_eq!(on.a.wrong_totals().await.unwrap().len(), 3);
+    assert!(on.tamper("UPDATE stored_bytes SET bytes = bytes - 1").await);
 }
 
 async fn everything_stored_counts_for_its_tenant(on: &Stores) {

@@ -119,6 +119,43 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     serves(data.path(), &paths).await;
 }
 
+#[tokio::test]
+async fn totals_that_are_not_the_sums_are_found_and_made_anew() {
+    use sqlx::{ConnectOptions, Connection, Executor};
+    let data = tempfile::tempdir().unwrap();
+    let (service, _) = filled(data.path()).await;
+    service.kill();
+    assert!(examine(data.path(), None, None).await.unwrap().is_healthy());
+    let usage = async || {
+        let rows = open_rows(data.path()).await.unwrap();
+        let usage = rows.usage(&Tenant::default()).await.unwrap();
+        rows.close().await;
+        usage.bytes
+    };
+    let stored = usage().await;
+    let database = data.path().join("ventriform.db");
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(database);
+    let mut connection = options.connect().await.unwrap();
+    let wrong = "UPDATE stored_bytes SET bytes = 5; UPDATE stored_items SET items = 9";
+    connection.execute(sqlx::raw_sql(wrong)).await.unwrap();
+    connection.close().await.unwrap();
+    assert_eq!(usage().await, 5);
+    let found = examine(data.path(), None, None).await.unwrap();
+    assert_eq!(kinds(&found), ["wrong-totals"]);
+    let said = &found.findings[0].detail;
+    assert!(
+        said.contains(&format!(
+            "5 for the bytes of tenant default, and there are {stored}"
+        )),
+        "{said}"
+    );
+    let repaired = examine(data.path(), None, Some(&Repair::default()));
+    assert!(repaired.await.unwrap().is_healthy());
+    assert_eq!(usage().await, stored);
+    let again = examine(data.path(), None, None).await.unwrap();
+    assert!(again.findings.is_empty(), "{again:?}");
+}
+
 /// What a repair takes away and what it brings back has a row of the trail each; a backup, which leaves out what is
 /// damaged, adds none to its own.
 #[tokio::test]

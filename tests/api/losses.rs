@@ -142,7 +142,7 @@ async fn counts(database: &Path) -> BTreeMap<String, i64> {
     let mut connection = options.connect().await.unwrap();
     let names: Vec<String> = sqlx::query_scalar(
         "SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite%'
-             AND name NOT IN ('_sqlx_migrations', 'probe')",
+             AND name NOT IN ('_sqlx_migrations', 'probe', 'stored_bytes', 'stored_items')",
     )
     .fetch_all(&mut connection)
     .await

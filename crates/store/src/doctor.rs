@@ -15,6 +15,7 @@
 //! 5. Every item in the quarantine: repair brings back those that are whole, have a record, and
 //!    were not erased by anybody.
 //! 6. Leftovers of writes and deletions: repair deletes them.
+//! 7. The running totals by which quotas are judged: are they the sums of what is stored? Repair makes them anew.
 //!
 //! If the files are in a bucket, steps 2 to 5 are done there ([`super::s3`]).
 //!
@@ -470,6 +471,21 @@ impl<'a> Doctor<'a> {
         Ok(())
     }
 
+    /// Compares the running totals with what they stand for.
+    async fn totals(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
+        let wrong = rows.wrong_totals().await?;
+        if wrong.is_empty() {
+            return Ok(());
+        }
+        if self.repair.is_some() {
+            rows.recount().await?;
+        }
+        let repair = self.if_repairing("the totals were made anew");
+        self.found
+            .note("wrong-totals", "totals", wrong.join(" "), repair);
+        Ok(())
+    }
+
     /// Without a database and without a repair: how many items wait for one.
     async fn shelves_without_rows(&mut self) -> Result<(), DoctorError> {
         let mut shelved = self.shelved()?;
@@ -510,6 +526,7 @@ impl<'a> Doctor<'a> {
             }
         }
         examined?;
+        self.totals(rows).await?;
         self.access(rows).await?;
         self.trail(rows).await?;
         if self.repair.is_some() {

@@ -2,12 +2,12 @@
 //!
 //! A damaged database is copied table by table into a new one: each whole, or else row by row from both ends up to the
 //! damage, and every row between by its number. Foreign keys and triggers are off meanwhile, so that no row is dropped
-//! because another one is lost. What is lost is told by the indexes, which lie on other pages, and by the numbers that
-//! SQLite has given to rows.
+//! because another one is lost; what triggers would have kept is made anew. What is lost is told by the indexes, which
+//! lie on other pages, and by the numbers that SQLite has given to rows.
 
 use super::database::SqlStore;
 use super::query::query;
-use super::tables::{Holder, append, repaired};
+use super::tables::{Holder, RECOUNT, append, repaired};
 use crate::faults;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
@@ -169,7 +169,7 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
     let tables: Vec<String> = sqlx::query_scalar(
         "SELECT name FROM sqlite_schema
          WHERE type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
-           AND name NOT IN ('_sqlx_migrations', 'probe')",
+           AND name NOT IN ('_sqlx_migrations', 'probe', 'stored_bytes', 'stored_items')",
     )
     .fetch_all(&mut *to)
     .await?;
@@ -226,6 +226,9 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
         run(to, format!("INSERT OR IGNORE INTO main.label_index (tenant, kind, name, value, sequence) {from}")).await?;
     }
     salvaged.retain(|found: &Salvaged| found.table != "label_index");
+    for statement in RECOUNT {
+        run(to, statement).await?;
+    }
     for (_, sql) in &triggers {
         run(to, sql.clone()).await?;
     }

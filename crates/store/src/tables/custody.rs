@@ -10,7 +10,7 @@ use ventriform_service::base::records::{
 };
 
 /// The tables that every database has.
-const TABLES: [&str; 22] = [
+const TABLES: [&str; 24] = [
     "api_keys",
     "audit",
     "audit_anchors",
@@ -30,6 +30,8 @@ const TABLES: [&str; 22] = [
     "scans",
     "sends",
     "sources",
+    "stored_bytes",
+    "stored_items",
     "trusted_time",
     "volumes",
     "workitems",

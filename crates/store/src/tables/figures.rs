@@ -1,4 +1,4 @@
-//! Figures for operators, counted in the database.
+//! Figures for operators, from the database. None is counted row by row, except what waits.
 
 use super::rows;
 use crate::database::SqlStore;
@@ -13,12 +13,9 @@ impl FigureStore for SqlStore {
             query("SELECT created_at FROM jobs WHERE state = 'queued' ORDER BY sequence LIMIT 1")
                 .fetch_optional(&self.readers)
                 .await?;
-        let found = query(
-            "SELECT 'volume', count(*) FROM volumes
-             UNION ALL SELECT kind, count(*) FROM products GROUP BY kind",
-        )
-        .fetch_all(&self.readers)
-        .await?;
+        let found = query("SELECT kind, items FROM stored_items")
+            .fetch_all(&self.readers)
+            .await?;
         let counts: Vec<(String, u64)> = rows::all(found, |row| {
             Ok((row.try_get(0)?, rows::unsigned(row.try_get(1)?)))
         })?;

@@ -541,8 +541,8 @@ async fn group_of_gates(
     let row = query(
         "SELECT id FROM intake_groups WHERE tenant = $1 AND study = $2 AND series = $3 AND instance = ''
          UNION ALL
-         SELECT g.id FROM intake_objects AS o JOIN intake_groups AS g ON g.id = o.group_id
-         WHERE o.tenant = $1 AND o.series = $3 AND g.study = $2
+         SELECT g.id FROM intake_groups AS g JOIN intake_objects AS o ON o.group_id = g.id
+         WHERE g.tenant = $1 AND g.study = $2 AND o.series = $3
          LIMIT 1",
     )
     .bind(object.origin.tenant.as_str())

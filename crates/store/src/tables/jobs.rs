@@ -108,25 +108,30 @@ fn milliseconds(length: Duration) -> i64 {
     i64::try_from(length.as_millis()).map_or(i64::MAX / 2, |length| length.min(i64::MAX / 2))
 }
 
+/// The statement of [`renew_volumes`]. Each engine would read all volumes of the tenant: SQLite prefers the index of
+/// kinds to the key unless it cannot use it; PostgreSQL takes the needs of a job for a thousand, and an array for ten.
+fn renewal(kind: &str, [before, after]: [&str; 2]) -> String {
+    format!(
+        "UPDATE holdings SET renewed_at = CASE WHEN renewed_at > $1 THEN renewed_at ELSE $1 END
+         WHERE tenant = $2 AND {kind} = 'volume' AND id {before} (
+             SELECT $3 UNION ALL
+             SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = $4){after}"
+    )
+}
+
+/// [`renewal`] on SQLite.
+fn renewal_on_sqlite() -> String {
+    renewal("+kind", ["IN", ""])
+}
+
 /// The age of the volumes that a job works on counts from now, for the tenant of the job.
 pub(super) async fn renew_volumes(
     to: &mut Transaction<'_>,
     job: &Job,
     now: Timestamp,
 ) -> StoreResult<()> {
-    let renew = |among: [&str; 2]| {
-        format!(
-            "UPDATE holdings SET renewed_at = CASE WHEN renewed_at > $1 THEN renewed_at ELSE $1 END
-             WHERE tenant = $2 AND kind = 'volume' AND id {} (
-                 SELECT $3 UNION ALL
-                 SELECT value FROM jobs, json_each(jobs.needs) WHERE jobs.id = $4){}",
-            among[0], among[1]
-        )
-    };
-    // PostgreSQL takes the needs of a job for a thousand and would read all volumes of the tenant; an array
-    // it takes for ten.
-    query(renew(["IN", ""]))
-        .on_postgres(renew(["= ANY (ARRAY", ")"]))
+    query(renewal_on_sqlite())
+        .on_postgres(renewal("kind", ["= ANY (ARRAY", ")"]))
         .bind(now)
         .bind(job.tenant.as_str())
         .bind(&job.volume)
@@ -757,13 +762,27 @@ mod tests {
         rows::all(rows, |row| row.try_get("detail")).unwrap()
     }
 
-    #[tokio::test]
-    async fn places_and_turns_are_read_from_an_index_alone() {
-        let folder = tempfile::tempdir().unwrap();
+    async fn open(folder: &tempfile::TempDir) -> SqlStore {
         let gauge = DiskGauge::new(folder.path(), None);
         let path = folder.path().join("jobs.db");
         let store = SqlStore::open(&path, Duration::from_secs(1), gauge).await;
-        let store = store.unwrap();
+        store.unwrap()
+    }
+
+    #[tokio::test]
+    async fn the_volumes_of_a_job_are_found_by_their_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = open(&folder).await;
+        let found = plan(&store, &renewal_on_sqlite()).await;
+        let by_key = "SEARCH holdings USING INDEX sqlite_autoindex_holdings_1 (tenant=? AND id=?)";
+        assert_eq!(found[0], by_key, "{found:#?}");
+        store.close().await;
+    }
+
+    #[tokio::test]
+    async fn places_and_turns_are_read_from_an_index_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = open(&folder).await;
         let places = plan(&store, QUEUE_POSITIONS).await;
         for step in [
             "SEARCH turns USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",

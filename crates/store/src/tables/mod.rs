@@ -18,9 +18,11 @@ mod rows;
 mod scan_erasure;
 mod scans;
 mod times;
+mod totals;
 mod worklist;
 
 pub(crate) use access::append;
 pub(crate) use marks::{Access, Marks, anchor_of};
 pub(crate) use owners::{Holder, Holding, REPAIRER, repaired};
 pub(super) use rows::to_json;
+pub(crate) use totals::RECOUNT;
