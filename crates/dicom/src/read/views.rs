@@ -67,7 +67,11 @@ impl ViewOrder {
         if !gated && counts[3] * counts[4] > 1 {
             let reason = "the Image Type says that the image is not gated, and the vector has \
                           several gates";
-            let of = if counts[4] > 1 { TIME_SLOT_VECTOR } else { RR_INTERVAL_VECTOR };
+            let of = if counts[4] > 1 {
+                TIME_SLOT_VECTOR
+            } else {
+                RR_INTERVAL_VECTOR
+            };
             let number = counts[3].max(counts[4]).to_string();
             return Err(a.wrong(of.name, &number, reason.into()));
         }
@@ -118,7 +122,9 @@ impl ViewOrder {
         let run = (window * self.detectors() + detector) * self.rotations() + rotation;
         let run = run * self.gates() + gate;
         let first = run * self.views();
-        self.stored.get(first..first + self.views()).unwrap_or_default()
+        self.stored
+            .get(first..first + self.views())
+            .unwrap_or_default()
     }
 }
 
@@ -166,7 +172,8 @@ fn check_number(a: &Attributes, number: Attribute, held: usize) -> Result<(), Re
         Some(0) | None => Ok(()),
         Some(stated) if usize::from(*stated) == held => Ok(()),
         Some(stated) => {
-            let reason = format!("the vector of the frames has {held}; frames are missing, or too many");
+            let reason =
+                format!("the vector of the frames has {held}; frames are missing, or too many");
             Err(a.wrong(number.name, &stated.to_string(), reason))
         }
     }
@@ -183,7 +190,11 @@ fn numbers(
     let mut numbers = a.shorts(vector);
     if numbers.is_empty() {
         let needed = vector == ANGULAR_VIEW_VECTOR || (gated && vector == TIME_SLOT_VECTOR);
-        return if needed { Err(a.missing(vector)) } else { Ok(vec![1; frames]) };
+        return if needed {
+            Err(a.missing(vector))
+        } else {
+            Ok(vec![1; frames])
+        };
     }
     if numbers.len() != frames {
         let reason = format!(
@@ -198,7 +209,9 @@ fn numbers(
                 "The {} counts from 0 and not from 1: 1 is added to each.",
                 vector.name
             ));
-            numbers.iter_mut().for_each(|number| *number = number.saturating_add(1));
+            numbers
+                .iter_mut()
+                .for_each(|number| *number = number.saturating_add(1));
         }
         1 => {}
         least => {
@@ -264,12 +277,36 @@ mod tests {
         let views: (Attribute, &[u16]) = (ANGULAR_VIEW_VECTOR, &[1, 2, 1, 2]);
         let cases: [(&[(Attribute, &[u16])], bool, Attribute); 7] = [
             (&[views], false, ANGULAR_VIEW_VECTOR),
-            (&[(DETECTOR_VECTOR, &[1, 1, 2, 2])], false, ANGULAR_VIEW_VECTOR),
-            (&[(ANGULAR_VIEW_VECTOR, &[2, 3, 4, 5])], false, ANGULAR_VIEW_VECTOR),
-            (&[views, (DETECTOR_VECTOR, &[1, 1, 2])], false, DETECTOR_VECTOR),
-            (&[views, (DETECTOR_VECTOR, &[1, 1, 2, 2]), (DETECTORS, &[3])], false, DETECTORS),
-            (&[views, (TIME_SLOT_VECTOR, &[1, 1, 2, 2])], false, TIME_SLOT_VECTOR),
-            (&[views, (RR_INTERVAL_VECTOR, &[1, 1, 2, 2])], true, TIME_SLOT_VECTOR),
+            (
+                &[(DETECTOR_VECTOR, &[1, 1, 2, 2])],
+                false,
+                ANGULAR_VIEW_VECTOR,
+            ),
+            (
+                &[(ANGULAR_VIEW_VECTOR, &[2, 3, 4, 5])],
+                false,
+                ANGULAR_VIEW_VECTOR,
+            ),
+            (
+                &[views, (DETECTOR_VECTOR, &[1, 1, 2])],
+                false,
+                DETECTOR_VECTOR,
+            ),
+            (
+                &[views, (DETECTOR_VECTOR, &[1, 1, 2, 2]), (DETECTORS, &[3])],
+                false,
+                DETECTORS,
+            ),
+            (
+                &[views, (TIME_SLOT_VECTOR, &[1, 1, 2, 2])],
+                false,
+                TIME_SLOT_VECTOR,
+            ),
+            (
+                &[views, (RR_INTERVAL_VECTOR, &[1, 1, 2, 2])],
+                true,
+                TIME_SLOT_VECTOR,
+            ),
         ];
         for (given, gated, field) in cases {
             match order(given, gated) {

@@ -45,7 +45,11 @@ impl Camera {
     pub(super) fn new(projections: &Projections, axis_offset_mm: f64) -> Self {
         let middle = 0.5 * (projections.columns as f64 - 1.0);
         Self {
-            turns: projections.views.iter().map(|view| Turn::new(*view)).collect(),
+            turns: projections
+                .views
+                .iter()
+                .map(|view| Turn::new(*view))
+                .collect(),
             count: projections.columns,
             middle,
             axis: middle + axis_offset_mm / projections.pixel_mm,
@@ -66,7 +70,10 @@ impl Camera {
                 let Some((at, [w0, w1, w2, w3])) = self.corner(x, y) else {
                     continue;
                 };
-                let ([a, b], [c, d]) = ([&image[at], &image[at + 1]], [&image[at + n], &image[at + n + 1]]);
+                let ([a, b], [c, d]) = (
+                    [&image[at], &image[at + 1]],
+                    [&image[at + n], &image[at + n + 1]],
+                );
                 for k in 0..LANES {
                     sum[k] += w0 * a[k] + w1 * b[k] + w2 * c[k] + w3 * d[k];
                 }

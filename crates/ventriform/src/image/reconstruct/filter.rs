@@ -76,10 +76,15 @@ pub(super) fn smoothed(
     if how.filter == Filter::None {
         return image;
     }
-    let axes = [Axis::padded(nx, nx), Axis::padded(ny, ny), Axis::mirrored(nz)];
+    let axes = [
+        Axis::padded(nx, nx),
+        Axis::padded(ny, ny),
+        Axis::mirrored(nz),
+    ];
     let voxel_cm = voxel_mm / 10.0;
     multiplied(image, axes, |at| {
-        let per_cm = [0, 1, 2].map(|axis| frequency_per_cm(at[axis], axes[axis].length(), voxel_cm));
+        let per_cm =
+            [0, 1, 2].map(|axis| frequency_per_cm(at[axis], axes[axis].length(), voxel_cm));
         how.gain(per_cm.iter().map(|f| f * f).sum::<f64>().sqrt())
     })
 }
@@ -107,11 +112,14 @@ pub(super) fn multiplied(
     let forward = [lx, ly, lz].map(|length| planner.plan_fft_forward(length));
     let inverse = [lx, ly, lz].map(|length| planner.plan_fft_inverse(length));
     transform(&mut waves, [lx, ly, lz], &forward);
-    waves.par_chunks_mut(lx).enumerate().for_each(|(line, row)| {
-        for (x, wave) in row.iter_mut().enumerate() {
-            *wave *= (scale * gain([x, line % ly, line / ly])) as f32;
-        }
-    });
+    waves
+        .par_chunks_mut(lx)
+        .enumerate()
+        .for_each(|(line, row)| {
+            for (x, wave) in row.iter_mut().enumerate() {
+                *wave *= (scale * gain([x, line % ly, line / ly])) as f32;
+            }
+        });
     transform(&mut waves, [lx, ly, lz], &inverse);
     let mut values = values;
     for (line, row) in values.chunks_exact_mut(nx).enumerate() {
@@ -125,7 +133,9 @@ pub(super) fn multiplied(
 
 /// Transforms the lines along every axis. Each line is worked on for itself.
 fn transform(waves: &mut [Wave], [lx, ly, lz]: [usize; 3], along: &[Arc<dyn Fft<f32>>; 3]) {
-    waves.par_chunks_mut(lx).for_each(|line| along[0].process(line));
+    waves
+        .par_chunks_mut(lx)
+        .for_each(|line| along[0].process(line));
     if ly > 1 {
         waves.par_chunks_mut(lx * ly).for_each(|plane| {
             columns(plane, lx, ly, &*along[1]);
@@ -134,17 +144,23 @@ fn transform(waves: &mut [Wave], [lx, ly, lz]: [usize; 3], along: &[Arc<dyn Fft<
     if lz > 1 {
         // Planes of x and z, one for each y, are put together, transformed and put back.
         let mut turned = vec![Wave::new(0.0, 0.0); waves.len()];
-        turned.par_chunks_mut(lx * lz).enumerate().for_each(|(y, plane)| {
-            for (z, row) in plane.chunks_exact_mut(lx).enumerate() {
-                let at = (z * ly + y) * lx;
-                row.copy_from_slice(&waves[at..at + lx]);
-            }
-            columns(plane, lx, lz, &*along[2]);
-        });
-        waves.par_chunks_mut(lx).enumerate().for_each(|(line, row)| {
-            let at = (line % ly * lz + line / ly) * lx;
-            row.copy_from_slice(&turned[at..at + lx]);
-        });
+        turned
+            .par_chunks_mut(lx * lz)
+            .enumerate()
+            .for_each(|(y, plane)| {
+                for (z, row) in plane.chunks_exact_mut(lx).enumerate() {
+                    let at = (z * ly + y) * lx;
+                    row.copy_from_slice(&waves[at..at + lx]);
+                }
+                columns(plane, lx, lz, &*along[2]);
+            });
+        waves
+            .par_chunks_mut(lx)
+            .enumerate()
+            .for_each(|(line, row)| {
+                let at = (line % ly * lz + line / ly) * lx;
+                row.copy_from_slice(&turned[at..at + lx]);
+            });
     }
 }
 

@@ -52,7 +52,9 @@ pub struct Projections {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ProjectionsError {
     /// Too few views or columns.
-    #[error("there are {views} views of {columns} columns; a volume needs {FEWEST_VIEWS} and {FEWEST_COLUMNS}")]
+    #[error(
+        "there are {views} views of {columns} columns; a volume needs {FEWEST_VIEWS} and {FEWEST_COLUMNS}"
+    )]
     TooFew {
         /// Views.
         views: usize,
@@ -114,7 +116,10 @@ impl Projections {
                 limit: MOST_STEPS,
             });
         }
-        let gap_deg = shares_deg(views).into_iter().map(|(gap, _)| gap).fold(0.0, f64::max);
+        let gap_deg = shares_deg(views)
+            .into_iter()
+            .map(|(gap, _)| gap)
+            .fold(0.0, f64::max);
         if gap_deg > WIDEST_GAP_DEG {
             return Err(ProjectionsError::Gap { gap_deg });
         }

@@ -56,14 +56,20 @@ impl Ball {
 
 /// `views` angles from `start` on, rising or falling over `arc`.
 fn turn(start: f64, arc: f64, views: usize) -> Vec<f64> {
-    (0..views).map(|view| start + arc * view as f64 / views as f64).collect()
+    (0..views)
+        .map(|view| start + arc * view as f64 / views as f64)
+        .collect()
 }
 
 /// Where a voxel is, LPS mm, and its value.
 fn voxels(image: &[f32]) -> impl Iterator<Item = ([f64; 3], f64)> {
     let place = |at: usize, count: usize| (at as f64 - 0.5 * (count as f64 - 1.0)) * PIXEL_MM;
     image.iter().enumerate().map(move |(at, value)| {
-        let (x, y, z) = (at % COLUMNS, at / COLUMNS % COLUMNS, at / (COLUMNS * COLUMNS));
+        let (x, y, z) = (
+            at % COLUMNS,
+            at / COLUMNS % COLUMNS,
+            at / (COLUMNS * COLUMNS),
+        );
         let at = [place(x, COLUMNS), place(y, COLUMNS), place(z, ROWS)];
         (at, f64::from(*value))
     })
@@ -74,7 +80,9 @@ fn mean_about(image: &[f32], centre: [f64; 3], radius_mm: f64) -> f64 {
         let off2: f64 = at.iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum();
         off2 < radius_mm * radius_mm
     });
-    let (sum, count) = near.fold((0.0, 0.0), |(sum, count), (_, value)| (sum + value, count + 1.0));
+    let (sum, count) = near.fold((0.0, 0.0), |(sum, count), (_, value)| {
+        (sum + value, count + 1.0)
+    });
     sum / count
 }
 
@@ -145,14 +153,23 @@ fn counts_are_conserved_and_both_methods_agree() {
         filter: Filter::None,
         ..Reconstruction::default()
     };
-    let sum = |how: &Reconstruction| image(&projections, how).iter().map(|v| f64::from(*v)).sum::<f64>();
+    let sum = |how: &Reconstruction| {
+        image(&projections, how)
+            .iter()
+            .map(|v| f64::from(*v))
+            .sum::<f64>()
+    };
     let share = sum(&unfiltered) / expected;
     assert!((share - 1.0).abs() < 0.01, "{share}");
     // The filter swings below 0 beside sharp edges, where it is cut.
     let share = sum(&Reconstruction::default()) / expected;
     assert!((0.99..1.05).contains(&share), "{share}");
     let [osem, fbp] = [Reconstruction::default(), fbp()].map(|how| image(&projections, &how));
-    let pairs = || osem.iter().zip(&fbp).map(|(a, b)| (f64::from(*a), f64::from(*b)));
+    let pairs = || {
+        osem.iter()
+            .zip(&fbp)
+            .map(|(a, b)| (f64::from(*a), f64::from(*b)))
+    };
     let apart: f64 = pairs().map(|(a, b)| (a - b).powi(2)).sum();
     let size: f64 = pairs().map(|(a, _)| a * a).sum();
     assert!((apart / size).sqrt() < 0.08, "{}", (apart / size).sqrt());
@@ -183,7 +200,11 @@ fn the_expected_counts_of_the_image_approach_those_measured() {
         for view in 0..angles.len() {
             camera.project(view, &slice, &mut sums);
             let row = &projections.view(view)[9 * COLUMNS..10 * COLUMNS];
-            apart += sums.iter().zip(row).map(|(sum, count)| (sum[0] - count).powi(2)).sum::<f32>();
+            apart += sums
+                .iter()
+                .zip(row)
+                .map(|(sum, count)| (sum[0] - count).powi(2))
+                .sum::<f32>();
         }
         apart
     };
@@ -207,10 +228,16 @@ fn an_axis_beside_the_middle_is_made_up_for() {
         ..Reconstruction::default()
     };
     let right = centre_of(&image(&moved, &how));
-    assert!((0..3).all(|axis| (right[axis] - ball.centre[axis]).abs() < 1.0), "{right:?}");
+    assert!(
+        (0..3).all(|axis| (right[axis] - ball.centre[axis]).abs() < 1.0),
+        "{right:?}"
+    );
     let inside = mean_about(&image(&moved, &how), ball.centre, 8.0);
     let without = mean_about(&image(&moved, &Reconstruction::default()), ball.centre, 8.0);
-    assert!(inside > 0.85 && without < 0.8 * inside, "{inside} {without}");
+    assert!(
+        inside > 0.85 && without < 0.8 * inside,
+        "{inside} {without}"
+    );
 }
 
 #[test]
@@ -248,7 +275,10 @@ fn the_bytes_are_the_same_on_any_number_of_threads() {
     let projections = BIG.projections(&turn(225.0, -180.0, 30));
     for how in [Reconstruction::default(), fbp()] {
         let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| image(&projections, &how))
         };
         let bits = |image: Vec<f32>| image.into_iter().map(f32::to_bits).collect::<Vec<_>>();
@@ -296,7 +326,10 @@ fn no_counts_make_an_empty_image() {
 #[test]
 fn what_no_volume_can_be_made_of_is_refused_before_any_work() {
     let views = |angles: Vec<f64>| -> Vec<View> {
-        angles.into_iter().map(|angle_deg| View { angle_deg }).collect()
+        angles
+            .into_iter()
+            .map(|angle_deg| View { angle_deg })
+            .collect()
     };
     let half = views(turn(225.0, -180.0, 60));
     assert_eq!(Projections::check(64, 64, &half), Ok(()));
@@ -310,7 +343,10 @@ fn what_no_volume_can_be_made_of_is_refused_before_any_work() {
     ));
     assert!(matches!(
         Projections::check(1024, 1024, &half),
-        Err(ProjectionsError::Voxels { amount: 1_073_741_824, .. })
+        Err(ProjectionsError::Voxels {
+            amount: 1_073_741_824,
+            ..
+        })
     ));
     let many = views(turn(0.0, 360.0, 1024));
     assert!(matches!(
@@ -322,7 +358,15 @@ fn what_no_volume_can_be_made_of_is_refused_before_any_work() {
 #[test]
 fn subsets_divide_the_views_where_they_can() {
     let how = Reconstruction::default();
-    for (views, subsets) in [(30, 10), (60, 10), (64, 8), (32, 8), (59, 10), (8, 8), (72, 9)] {
+    for (views, subsets) in [
+        (30, 10),
+        (60, 10),
+        (64, 8),
+        (32, 8),
+        (59, 10),
+        (8, 8),
+        (72, 9),
+    ] {
         assert_eq!(how.subsets_of(views), subsets, "{views}");
     }
 }

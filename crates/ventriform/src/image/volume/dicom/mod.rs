@@ -429,7 +429,11 @@ impl DicomFile {
                     let (voxels, own) = raw.volume(&self.parts[0], &[volume], false, &part)?;
                     tally.add_portion(&voxels);
                     take(0, &voxels);
-                    warnings.extend(own.into_iter().filter(|own| !warnings.contains(own)).collect::<Vec<_>>());
+                    warnings.extend(
+                        own.into_iter()
+                            .filter(|own| !warnings.contains(own))
+                            .collect::<Vec<_>>(),
+                    );
                 }
                 Ok((tally, warnings))
             }

@@ -90,7 +90,10 @@ pub(super) fn by_turn(runs: &[Run]) -> Vec<usize> {
 
 /// Degrees that the views cover, each with its step.
 pub(super) fn arc_deg(views: &[View]) -> f64 {
-    let mut angles: Vec<f64> = views.iter().map(|v| v.angle_deg.rem_euclid(360.0)).collect();
+    let mut angles: Vec<f64> = views
+        .iter()
+        .map(|v| v.angle_deg.rem_euclid(360.0))
+        .collect();
     angles.sort_by(f64::total_cmp);
     let Some(first) = angles.first().copied() else {
         return 0.0;
@@ -104,13 +107,17 @@ pub(super) fn arc_deg(views: &[View]) -> f64 {
 
 /// The angle of each detector at its first view.
 fn detector_starts(a: &Attributes, order: &ViewOrder) -> Result<Vec<f64>, ReadError> {
-    let of_rotation = a.decimals_of_item::<1>(ROTATION_START, 0)?.map(|[angle]| angle);
+    let of_rotation = a
+        .decimals_of_item::<1>(ROTATION_START, 0)?
+        .map(|[angle]| angle);
     let of_detector = |detector| a.decimals_of_item::<1>(DETECTOR_START, detector);
     let detectors = order.detectors();
     if detectors == 1 {
         let own = of_detector(0)?.map(|[angle]| angle);
         return match (of_rotation, own) {
-            (Some(stated), Some(own)) if !is_same(stated, own) => Err(contradiction(a, stated, own)),
+            (Some(stated), Some(own)) if !is_same(stated, own) => {
+                Err(contradiction(a, stated, own))
+            }
             (Some(angle), _) | (None, Some(angle)) => Ok(vec![angle]),
             (None, None) => Err(a.missing(ROTATION_START)),
         };
@@ -126,7 +133,11 @@ fn detector_starts(a: &Attributes, order: &ViewOrder) -> Result<Vec<f64>, ReadEr
             return Err(a.wrong(DETECTOR_START.name, "missing", reason));
         };
         if let Some(same) = starts.iter().position(|other| is_same(*other, start)) {
-            let reason = format!("detectors {} and {} cannot be at one angle", same + 1, detector + 1);
+            let reason = format!(
+                "detectors {} and {} cannot be at one angle",
+                same + 1,
+                detector + 1
+            );
             return Err(a.wrong(DETECTOR_START.name, &start.to_string(), reason));
         }
         starts.push(start);
@@ -198,7 +209,8 @@ impl Rotation {
             && stated != 0
             && ![views, all].contains(&usize::from(stated))
         {
-            let reason = format!("the Angular View Vector (0054,0090) has {views} views of a rotation");
+            let reason =
+                format!("the Angular View Vector (0054,0090) has {views} views of a rotation");
             return Err(a.wrong(ROTATION_FRAMES.name, &stated.to_string(), reason));
         }
         if let Some([arc]) = a.decimals_of_item::<1>(SCAN_ARC, rotation)?

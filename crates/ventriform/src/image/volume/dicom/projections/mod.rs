@@ -29,12 +29,10 @@ use super::posture;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::base::progress::{Monitor, Stage};
-use crate::image::reconstruct::{
-    Projections, ProjectionsError, Reconstruction, View, reconstruct,
-};
+use crate::image::reconstruct::{Projections, ProjectionsError, Reconstruction, View, reconstruct};
 use ventriform_dicom::read::attributes::{
-    Attribute, Attributes, CENTRE_OF_ROTATION, COLLIMATOR_TYPE, CORRECTED_IMAGE, DETECTOR_ORIENTATION,
-    DETECTOR_TILT, NUMBER_OF_FRAMES, PIXEL_SPACING, SCAN_ARC, ZOOM_FACTOR,
+    Attribute, Attributes, CENTRE_OF_ROTATION, COLLIMATOR_TYPE, CORRECTED_IMAGE,
+    DETECTOR_ORIENTATION, DETECTOR_TILT, NUMBER_OF_FRAMES, PIXEL_SPACING, SCAN_ARC, ZOOM_FACTOR,
 };
 use ventriform_dicom::read::views::ViewOrder;
 
@@ -85,11 +83,18 @@ impl Acquisition {
         }
         let window = windows::chosen(a, order.windows(), how.energy_window, warnings)?;
         let runs = angles::runs(a, &order)?;
-        let views: Vec<View> = runs.iter().flat_map(|run| run.views.iter().copied()).collect();
+        let views: Vec<View> = runs
+            .iter()
+            .flat_map(|run| run.views.iter().copied())
+            .collect();
         let by_turn = angles::by_turn(&runs);
         let of_gate = |gate: usize| -> Vec<usize> {
-            let of_run = |run: &angles::Run| order.views_of(window, run.detector, run.rotation, gate);
-            let frames: Vec<usize> = runs.iter().flat_map(|run| of_run(run).iter().copied()).collect();
+            let of_run =
+                |run: &angles::Run| order.views_of(window, run.detector, run.rotation, gate);
+            let frames: Vec<usize> = runs
+                .iter()
+                .flat_map(|run| of_run(run).iter().copied())
+                .collect();
             by_turn.iter().map(|at| frames[*at]).collect()
         };
         let frames = (0..order.gates()).map(of_gate).collect();
@@ -97,7 +102,8 @@ impl Acquisition {
         let [columns, rows] = pixels.extent;
         Projections::check(columns, rows, &views).map_err(|error| refused(a, error))?;
         let first = views.first().map_or(0.0, |view| view.angle_deg);
-        let from_feet = rows_run_to_the_head(a, runs.first().map_or(first, angles::Run::start), warnings)?;
+        let from_feet =
+            rows_run_to_the_head(a, runs.first().map_or(first, angles::Run::start), warnings)?;
         if let Some(cited) = posture::not_supine(a) {
             warnings.push(format!(
                 "{cited}: the angles of the detector are counted from the patient's back, as PS3.3 C.8.4.11 has them. If \
@@ -153,7 +159,10 @@ impl Acquisition {
     /// The method and the filter, for the header of what is made.
     pub(super) fn derivation(&self) -> [String; 2] {
         let method = self.how.method_text(self.views.len());
-        [format!("reconstructed here: {method}"), self.how.filter_text()]
+        [
+            format!("reconstructed here: {method}"),
+            self.how.filter_text(),
+        ]
     }
 
     /// The volume of the counts of `gates` together, and warnings about them; `coarse` for a quick look.
@@ -182,13 +191,20 @@ impl Acquisition {
         let frame_pixels = self.columns * self.rows;
         let count = frame_pixels * self.views.len();
         let mut counts: Vec<f32> = Vec::new();
-        let no_room = |_| VolumeError::Memory { bytes: 4 * count as u64 };
+        let no_room = |_| VolumeError::Memory {
+            bytes: 4 * count as u64,
+        };
         counts.try_reserve_exact(count).map_err(no_room)?;
         counts.resize(count, 0.0);
         // Files are read from their beginning to their end.
         let of_gates = gates.iter().filter_map(|gate| self.frames.get(*gate));
         let mut stored: Vec<(usize, usize)> = of_gates
-            .flat_map(|frames| frames.iter().enumerate().map(|(view, frame)| (*frame, view)))
+            .flat_map(|frames| {
+                frames
+                    .iter()
+                    .enumerate()
+                    .map(|(view, frame)| (*frame, view))
+            })
             .collect();
         stored.sort_unstable();
         let mut reader = pixels.open()?;
@@ -199,7 +215,11 @@ impl Acquisition {
                 for (offset, value) in values.iter().enumerate() {
                     let at = first + offset;
                     let (row, column) = (at / self.columns, at % self.columns);
-                    let row = if self.from_feet { self.rows - 1 - row } else { row };
+                    let row = if self.from_feet {
+                        self.rows - 1 - row
+                    } else {
+                        row
+                    };
                     let counts = &mut counts[view * frame_pixels + row * self.columns + column];
                     if *value >= 0.0 {
                         *counts += *value;
@@ -231,9 +251,13 @@ impl Acquisition {
 /// Why no volume can be made of the views.
 fn refused(a: &Attributes, error: ProjectionsError) -> VolumeError {
     match error {
-        ProjectionsError::TooFew { views, .. } => {
-            a.wrong(NUMBER_OF_FRAMES.name, &format!("{views} views"), error.to_string()).into()
-        }
+        ProjectionsError::TooFew { views, .. } => a
+            .wrong(
+                NUMBER_OF_FRAMES.name,
+                &format!("{views} views"),
+                error.to_string(),
+            )
+            .into(),
         ProjectionsError::Gap { gap_deg } => {
             let value = format!("without a view over {gap_deg:.0} degrees");
             a.wrong(SCAN_ARC.name, &value, error.to_string()).into()
@@ -258,7 +282,13 @@ fn square_pixel(a: &Attributes) -> Result<f64, VolumeError> {
     let [rows, columns] = pixel_spacing(a, None)?;
     if (rows - columns).abs() > EQUAL_SHARE * rows {
         let reason = "the pixels of projections must be square: export them on a square matrix of the field of view";
-        return Err(a.wrong(PIXEL_SPACING.name, &format!("{rows}\\{columns}"), reason.into()).into());
+        return Err(a
+            .wrong(
+                PIXEL_SPACING.name,
+                &format!("{rows}\\{columns}"),
+                reason.into(),
+            )
+            .into());
     }
     Ok(columns)
 }
@@ -269,7 +299,11 @@ fn check_detector(
     detector: usize,
     warnings: &mut Vec<String>,
 ) -> Result<(), VolumeError> {
-    match a.texts_of_item(COLLIMATOR_TYPE, detector).first().map(String::as_str) {
+    match a
+        .texts_of_item(COLLIMATOR_TYPE, detector)
+        .first()
+        .map(String::as_str)
+    {
         Some("PARA") => {}
         None | Some("" | "UNKN") => {
             if detector == 0 {
@@ -290,7 +324,9 @@ fn check_detector(
         && tilt.abs() > MAX_TILT_DEG
     {
         let reason = "projections of a tilted detector are not parallel to the slices; send reconstructed slices";
-        return Err(a.wrong(DETECTOR_TILT.name, &tilt.to_string(), reason.into()).into());
+        return Err(a
+            .wrong(DETECTOR_TILT.name, &tilt.to_string(), reason.into())
+            .into());
     }
     let zoom = |detector| a.texts_of_item(ZOOM_FACTOR, detector);
     let numbers = |texts: Vec<String>| -> Vec<f64> {
@@ -299,8 +335,13 @@ fn check_detector(
     let (own, first) = (numbers(zoom(detector)), numbers(zoom(0)));
     let differs = |(own, first): (&f64, &f64)| (own - first).abs() > EQUAL_SHARE * first.abs();
     if own.iter().zip(&first).any(differs) {
-        let reason = format!("detector {} has another zoom than the first; they must be alike", detector + 1);
-        return Err(a.wrong(ZOOM_FACTOR.name, &format!("{own:?}"), reason).into());
+        let reason = format!(
+            "detector {} has another zoom than the first; they must be alike",
+            detector + 1
+        );
+        return Err(a
+            .wrong(ZOOM_FACTOR.name, &format!("{own:?}"), reason)
+            .into());
     }
     let corrected = a.texts(CORRECTED_IMAGE).iter().any(|value| value == "COR");
     if let Some([offset]) = number(CENTRE_OF_ROTATION)?

@@ -27,7 +27,8 @@ pub(super) fn chosen(
     asked: Option<usize>,
     warnings: &mut Vec<String>,
 ) -> Result<usize, ReadError> {
-    let refuse = |value: String, reason: String| Err(a.wrong(ENERGY_WINDOW_VECTOR.name, &value, reason));
+    let refuse =
+        |value: String, reason: String| Err(a.wrong(ENERGY_WINDOW_VECTOR.name, &value, reason));
     match asked {
         Some(window) if (1..=windows).contains(&window) => return Ok(window - 1),
         Some(window) => {
@@ -65,7 +66,10 @@ pub(super) fn chosen(
         }
         _ => refuse(
             format!("of the windows {list}"),
-            format!("not one but {} of them hold the photopeak at {peak_kev} keV; set `energy_window`", holding.len()),
+            format!(
+                "not one but {} of them hold the photopeak at {peak_kev} keV; set `energy_window`",
+                holding.len()
+            ),
         ),
     }
 }
@@ -73,7 +77,12 @@ pub(super) fn chosen(
 /// The photopeak of the radionuclide that the file names, keV.
 fn photopeak_kev(a: &Attributes) -> f64 {
     let named = [NUCLIDE_MEANING, PHARMACEUTICAL_NAME].map(|attribute| a.prose(attribute));
-    let named = named.into_iter().flatten().collect::<Vec<_>>().join(" ").to_lowercase();
+    let named = named
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join(" ")
+        .to_lowercase();
     let found = PHOTOPEAKS_KEV.iter().find(|(word, _)| named.contains(word));
     found.map_or(TECHNETIUM_KEV, |(_, kev)| *kev)
 }
