@@ -57,8 +57,6 @@ const DATA_INFORMATION: Tag = tags::DATA_INFORMATION_SEQUENCE;
 const GATED_DATA: &[Tag] = &[GATED_INFORMATION, DATA_INFORMATION];
 /// The rotations of a camera, which are counted like frames as far as [`COUNTED_ATTRIBUTES`] go.
 const ROTATION_PATH: &[Tag] = &[tags::ROTATION_INFORMATION_SEQUENCE];
-/// The energy windows, which are counted like frames as far as [`COUNTED_ATTRIBUTES`] go.
-const WINDOW_PATH: &[Tag] = &[tags::ENERGY_WINDOW_INFORMATION_SEQUENCE];
 const PHARMACEUTICAL_PATH: &[Tag] = &[tags::RADIOPHARMACEUTICAL_INFORMATION_SEQUENCE];
 const PHARMACEUTICAL_CODE: &[Tag] = &[
     tags::RADIOPHARMACEUTICAL_INFORMATION_SEQUENCE,
@@ -347,7 +345,6 @@ attributes! {
     ENERGY_WINDOWS = &[], tags::NUMBER_OF_ENERGY_WINDOWS, "Number of Energy Windows (0054,0011)";
     DETECTORS = &[], tags::NUMBER_OF_DETECTORS, "Number of Detectors (0054,0021)";
     ROTATIONS = &[], tags::NUMBER_OF_ROTATIONS, "Number of Rotations (0054,0051)";
-    ENERGY_WINDOW_NAME = WINDOW_PATH, tags::ENERGY_WINDOW_NAME, "Energy Window Name (0054,0018)";
     DETECTOR_START = DETECTOR_PATH, tags::START_ANGLE, "Start Angle (0054,0200)";
     DETECTOR_TILT = DETECTOR_PATH, tags::GANTRY_DETECTOR_TILT, "Gantry/Detector Tilt (0018,1120)";
     COLLIMATOR_TYPE = DETECTOR_PATH, tags::COLLIMATOR_TYPE, "Collimator Type (0018,1181)";
@@ -381,7 +378,6 @@ const COUNTED_ATTRIBUTES: &[Attribute] = &[
     SCAN_ARC,
     ROTATION_FRAMES,
     FRAME_DURATION,
-    ENERGY_WINDOW_NAME,
     ENERGY_LOWER,
     ENERGY_UPPER,
 ];

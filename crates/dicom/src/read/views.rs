@@ -156,7 +156,7 @@ fn each_once(
         let [windows, detectors, rotations, intervals, slots, views] = counts;
         a.wrong(
             ANGULAR_VIEW_VECTOR.name,
-            &format!("of {views} views"),
+            &views.to_string(),
             format!(
                 "the {frames} frames must hold every view of every gate, rotation, detector and energy window exactly \
                  once, and the vectors have {windows} windows x {detectors} detectors x {rotations} rotations x \

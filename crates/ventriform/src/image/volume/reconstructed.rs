@@ -1,9 +1,10 @@
 //! Volumes of projections, reconstructed as the caller says. The readers of this room reconstruct projections too, with
 //! the defaults.
 
-use super::gate_timing::GateTiming;
+use super::gates::GatedReading;
+use super::left_out::LeftOut;
 use super::limits::{ReadLimits, ReadOptions};
-use super::open;
+use super::open::{self, Reading};
 use super::read::{Told, open_as};
 use super::source::VolumeFile;
 use super::{FileFormat, Provenance, Volume, VolumeError, VolumeFacts};
@@ -13,7 +14,7 @@ use crate::image::reconstruct::Reconstruction;
 /// What was reconstructed of the projections in a file.
 #[derive(Debug, Clone)]
 pub struct Reconstructed {
-    /// One volume, or those of all gates: time slots of all R-R intervals, those of the first interval first.
+    /// One volume, or those of all gates; of several R-R intervals, of the one with the most counts.
     pub volumes: Vec<Volume>,
     /// The length of a gate, ms; `None` if there is one volume, or the file does not say.
     pub gate_ms: Option<f64>,
@@ -60,43 +61,37 @@ pub fn reconstructed(
             limit: limits.voxels,
         });
     }
-    let chosen: Vec<Option<usize>> = match one {
-        true => vec![None],
-        false => (0..frames).map(Some).collect(),
+    let mut read = |frame: Option<usize>, part: &Monitor| {
+        let reading = open::read(&mut *opened.file, ReadOptions { frame }, part);
+        reading.map_err(|error| error.with_path(files))
     };
-    let mut volumes = Vec::with_capacity(chosen.len());
-    let mut first: Option<(VolumeFacts, Option<Provenance>)> = None;
-    for (done, frame) in chosen.iter().enumerate() {
-        let part = monitor.part(done, chosen.len());
-        let options = ReadOptions { frame: *frame };
-        let reading = open::read(&mut *opened.file, options, &part);
-        let reading = reading.map_err(|error| error.with_path(files))?;
-        volumes.push(reading.volume);
-        match &mut first {
-            None => first = Some((reading.facts, reading.provenance)),
-            Some((facts, _)) => {
-                let known = |warning: &String| !facts.warnings.contains(warning);
-                let new: Vec<String> = reading.facts.warnings.into_iter().filter(known).collect();
-                facts.warnings.extend(new);
-            }
+    let mut made = if one {
+        let Reading {
+            volume,
+            facts,
+            provenance,
+            ..
+        } = read(None, monitor)?;
+        Reconstructed {
+            volumes: vec![volume],
+            gate_ms: None,
+            facts,
+            provenance,
         }
-    }
-    let (mut facts, provenance) = first.ok_or(VolumeError::NoFile)?;
-    facts.warnings.append(&mut opened.notes);
-    Ok(Reconstructed {
-        gate_ms: match one {
-            true => None,
-            false => gate_ms(opened.file.gate_timings(), frames),
-        },
-        volumes,
-        facts,
-        provenance,
-    })
-}
-
-/// The length of a gate of the first R-R interval, ms.
-fn gate_ms(timings: Vec<GateTiming>, frames: usize) -> Option<f64> {
-    let timing = timings.into_iter().next()?;
-    let gates = timing.gates_of_interval(frames) as f64;
-    timing.frame_time_ms.or(timing.rr_ms.map(|ms| ms / gates))
+    } else {
+        let gates = (0..frames).map(|gate| read(Some(gate), &monitor.part(gate, frames)));
+        let gates: Vec<Reading> = gates.collect::<Result<_, _>>()?;
+        let (all, timings) = ((0..frames).collect(), opened.file.gate_timings());
+        let gated = GatedReading::new(gates, all, &LeftOut::default(), &timings, &[])?;
+        let number = gated.gates.len() as f64;
+        let of_beat = gated.timing.rr_ms.map(|ms| ms / number);
+        Reconstructed {
+            gate_ms: gated.timing.frame_time_ms.or(of_beat),
+            provenance: gated.provenance().cloned(),
+            volumes: gated.gates,
+            facts: gated.facts,
+        }
+    };
+    made.facts.warnings.append(&mut opened.notes);
+    Ok(made)
 }

@@ -100,7 +100,7 @@ impl Acquisition {
         let frames = (0..order.gates()).map(of_gate).collect();
         let views: Vec<View> = by_turn.iter().map(|at| views[*at]).collect();
         let [columns, rows] = pixels.extent;
-        Projections::check(columns, rows, &views).map_err(|error| refused(a, error))?;
+        Projections::check(columns, rows, &views).map_err(|error| refused(a, &views, error))?;
         let first = views.first().map_or(0.0, |view| view.angle_deg);
         let from_feet =
             rows_run_to_the_head(a, runs.first().map_or(first, angles::Run::start), warnings)?;
@@ -249,17 +249,13 @@ impl Acquisition {
 }
 
 /// Why no volume can be made of the views.
-fn refused(a: &Attributes, error: ProjectionsError) -> VolumeError {
+fn refused(a: &Attributes, views: &[View], error: ProjectionsError) -> VolumeError {
     match error {
         ProjectionsError::TooFew { views, .. } => a
-            .wrong(
-                NUMBER_OF_FRAMES.name,
-                &format!("{views} views"),
-                error.to_string(),
-            )
+            .wrong(NUMBER_OF_FRAMES.name, &views.to_string(), error.to_string())
             .into(),
-        ProjectionsError::Gap { gap_deg } => {
-            let value = format!("without a view over {gap_deg:.0} degrees");
+        ProjectionsError::Gap { .. } => {
+            let value = format!("{:.0}", angles::arc_deg(views));
             a.wrong(SCAN_ARC.name, &value, error.to_string()).into()
         }
         ProjectionsError::Voxels { amount, limit } => VolumeError::TooLarge {

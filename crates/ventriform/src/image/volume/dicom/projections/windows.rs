@@ -2,8 +2,8 @@
 
 use ventriform_dicom::read::ReadError;
 use ventriform_dicom::read::attributes::{
-    Attributes, ENERGY_LOWER, ENERGY_UPPER, ENERGY_WINDOW_NAME, ENERGY_WINDOW_VECTOR,
-    NUCLIDE_MEANING, PHARMACEUTICAL_NAME, clip,
+    Attributes, ENERGY_LOWER, ENERGY_UPPER, ENERGY_WINDOW_VECTOR, NUCLIDE_MEANING,
+    PHARMACEUTICAL_NAME,
 };
 
 /// The main photopeak of the radionuclides of cardiac scans, keV, by a word of their names in small letters.
@@ -33,7 +33,7 @@ pub(super) fn chosen(
         Some(window) if (1..=windows).contains(&window) => return Ok(window - 1),
         Some(window) => {
             let reason = format!("`energy_window` asks for window {window}");
-            return refuse(format!("of {windows} windows"), reason);
+            return refuse(windows.to_string(), reason);
         }
         None if windows == 1 => return Ok(0),
         None => {}
@@ -43,7 +43,6 @@ pub(super) fn chosen(
     let mut holding = Vec::new();
     for window in 0..windows {
         let limit = |attribute| a.decimals_of_item::<1>(attribute, window);
-        let name = a.texts_of_item(ENERGY_WINDOW_NAME, window).join(" ");
         let bounds = match (limit(ENERGY_LOWER)?, limit(ENERGY_UPPER)?) {
             (Some([lower]), Some([upper])) => {
                 if (lower..=upper).contains(&peak_kev) {
@@ -53,7 +52,7 @@ pub(super) fn chosen(
             }
             _ => "no limits".into(),
         };
-        list.push(format!("{} {} ({bounds})", window + 1, clip(&name)));
+        list.push(format!("{} ({bounds})", window + 1));
     }
     let list = list.join(", ");
     match holding[..] {
@@ -65,9 +64,9 @@ pub(super) fn chosen(
             Ok(window)
         }
         _ => refuse(
-            format!("of the windows {list}"),
+            windows.to_string(),
             format!(
-                "not one but {} of them hold the photopeak at {peak_kev} keV; set `energy_window`",
+                "of the windows {list}, not one but {} hold the photopeak at {peak_kev} keV; set `energy_window`",
                 holding.len()
             ),
         ),
