@@ -7,8 +7,8 @@ use dicom_dictionary_std::StandardSopClassDictionary;
 
 /// Advice on objects that can be sent.
 const READABLE_ADVICE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
-    RECON TOMO or RECON GATED TOMO, or its projections (TOMO or GATED TOMO), an Enhanced PET, CT or MR image, all files of one PET, CT or MR \
-    series (as several files or as one zip), or a Segmentation.";
+    RECON TOMO or RECON GATED TOMO, or its projections (TOMO or GATED TOMO), an Enhanced PET, CT or MR \
+    image, all files of one PET, CT or MR series (as several files or as one zip), or a Segmentation.";
 
 /// The objects that hold slices, or of which slices can be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -136,8 +136,8 @@ pub fn scan(
     })
 }
 
-/// The kind of the object whose data set begins at the position of `source`, which must be one that is read; `None` if it
-/// does not tell.
+/// The kind of the object whose data set begins at the position of `source`, which must be one that is read; `None` if
+/// it does not tell.
 ///
 /// # Errors
 /// As [`Kind::from_attributes`]; for one that names no class, as [`attributes`].

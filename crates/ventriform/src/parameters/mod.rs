@@ -2,9 +2,10 @@
 //! names that users give them.
 //!
 //! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`], [`NORMALS_SPECS`] and
-//! [`RECONSTRUCTION_SPECS`], define names, types, ranges, defaults and help texts for the command line, query strings, the JSON of jobs and the OpenAPI
-//! document. Text or JSON goes in; [`ModelParameters`], [`FitParameters`] or [`WithFit`] come out, with every value of
-//! the right type and in its range, or a [`ParameterError`] with the name of the first invalid parameter.
+//! [`RECONSTRUCTION_SPECS`], define names, types, ranges, defaults and help texts for the command line, query strings,
+//! the JSON of jobs and the OpenAPI document. Text or JSON goes in; [`ModelParameters`], [`FitParameters`] or
+//! [`WithFit`] come out, with every value of the right type and in its range, or a [`ParameterError`] with the name of
+//! the first invalid parameter.
 
 mod beat;
 mod calibration;

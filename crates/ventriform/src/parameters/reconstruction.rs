@@ -19,7 +19,8 @@ impl Parameters for Reconstruction {
 pub const RECONSTRUCTION_SPECS: &[ParameterSpec<Reconstruction>] = &[
     optional!(
         Integer usize, "energy_window", energy_window => energy_window, 1..=64, groups::MAIN, "",
-        "Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide"
+        "Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of \
+         the radionuclide"
     ),
     number!(
         "axis_offset_mm",

@@ -135,8 +135,8 @@ impl Camera {
     }
 }
 
-/// The volume whose packs of slices `make` makes of the rows from a number on, so many of them. Rows of frames run to the
-/// feet and slices to the head.
+/// The volume whose packs of slices `make` makes of the rows from a number on, so many of them. Rows of frames run to
+/// the feet and slices to the head.
 pub(super) fn in_packs(
     projections: &Projections,
     make: impl Fn(usize, usize) -> Result<Vec<Lanes>, Cancelled> + Sync,

@@ -1,7 +1,7 @@
 //! Filtered back projection: the ramp and the filter on every view, and each view spread over the image.
 //!
-//! The ramp is that of a band-limited signal, from its values in space (Kak and Slaney 1988, eq. 3.61), so that the image's
-//! mean is right. By the theorem of slices, a filter on the views is the same filter on the image.
+//! The ramp is that of a band-limited signal, from its values in space (Kak and Slaney 1988, eq. 3.61), so that the
+//! image's mean is right. By the theorem of slices, a filter on the views is the same filter on the image.
 
 use super::camera::{Camera, LANES, Lanes, in_packs};
 use super::filter::{Axis, frequency_per_cm, multiplied};

@@ -1,7 +1,7 @@
 //! A filter as a share of each frequency of an image.
 //!
-//! The spectrum is that of the image continued beyond its ends: in a slice by nothing, as there is nothing outside of the
-//! disc that the camera sees, and along the axis by its mirror image, so that the ends do not run into one another.
+//! The spectrum is that of the image continued beyond its ends: in a slice by nothing, as there is nothing outside of
+//! the disc that the camera sees, and along the axis by its mirror image, so that the ends do not run into one another.
 
 use super::parameters::{Filter, Reconstruction};
 use nalgebra::Complex;

@@ -11,9 +11,9 @@
 //!
 //! Values are counts: the sum of a volume is about the counts of one view. Nothing is below 0.
 //!
-//! Guaranteed: the same bytes for the same input whatever the number of threads: slices are worked on in packs, each for
-//! itself. A bound on the work ([`Projections::check`]) is checked before it begins; cancelling ends it within a pass over
-//! one pack.
+//! Guaranteed: the same bytes for the same input whatever the number of threads: slices are worked on in packs, each
+//! for itself. A bound on the work ([`Projections::check`]) is checked before it begins; cancelling ends it within a
+//! pass over one pack.
 //!
 //! Not in the model: attenuation, scatter, decay between the views, and the resolution of the collimator. An image made
 //! here is that of a scan without these corrections. Existing libraries were looked for: those of emission tomography

@@ -1,7 +1,7 @@
 //! Ordered subsets expectation maximisation (Hudson and Larkin 1994).
 //!
-//! For each subset of the views, the image is multiplied by what its expected counts lack of those measured, spread back
-//! over the voxels, as a share of what the subset sees of them.
+//! For each subset of the views, the image is multiplied by what its expected counts lack of those measured, spread
+//! back over the voxels, as a share of what the subset sees of them.
 
 use super::camera::{Camera, LANES, Lanes, in_packs};
 use super::parameters::Reconstruction;

@@ -1,15 +1,15 @@
 //! The counts of one gate as the camera acquired them, and how it turned.
 //!
 //! The frame is the patient's, LPS (x to the left, y to the back, z to the head). An angle is that of PS3.3 C.8.4.11
-//! and C.8.4.12: Start Angle (0054,0200) is 0 where the detector is at the patient's back, and rises counter-clockwise as
-//! seen from the feet: to the left side (90), the front (180), the right side (270). So the detector at angle a lies
+//! and C.8.4.12: Start Angle (0054,0200) is 0 where the detector is at the patient's back, and rises counter-clockwise
+//! as seen from the feet: to the left side (90), the front (180), the right side (270). So the detector at angle a lies
 //! toward (sin a, cos a) in x and y.
 //!
-//! A frame shows the patient as seen from the detector, the head on top: columns run toward (-cos a, sin a), rows to the
-//! feet. In front of the patient, at 180 degrees, columns run to the patient's left.
+//! A frame shows the patient as seen from the detector, the head on top: columns run toward (-cos a, sin a), rows to
+//! the feet. In front of the patient, at 180 degrees, columns run to the patient's left.
 //!
-//! The axis of rotation is the z axis through the middle of the frames, or beside it by the stated offset. Nothing in the
-//! file ties it to the patient: the origin is the middle of the axis.
+//! The axis of rotation is the z axis through the middle of the frames, or beside it by the stated offset. Nothing in
+//! the file ties it to the patient: the origin is the middle of the axis.
 
 /// Most voxels of a volume that is reconstructed: 256³. Its spectrum takes 16 bytes a voxel.
 const MOST_VOXELS: u64 = 1 << 24;
@@ -89,8 +89,8 @@ pub enum ProjectionsError {
 }
 
 impl Projections {
-    /// Checks whether a volume can be made of frames of `columns` and `rows` of these views, and that its size is within
-    /// the budget. No counts are needed for it.
+    /// Checks whether a volume can be made of frames of `columns` and `rows` of these views, and that its size is
+    /// within the budget. No counts are needed for it.
     ///
     /// # Errors
     /// [`ProjectionsError`].
@@ -138,8 +138,8 @@ impl Projections {
     }
 }
 
-/// For each view how far it lies from the one before it and from the one after it, as lines through the axis, which have
-/// no sides: the gap after it and the share of half a turn that is its own, degrees.
+/// For each view how far it lies from the one before it and from the one after it, as lines through the axis, which
+/// have no sides: the gap after it and the share of half a turn that is its own, degrees.
 pub(super) fn shares_deg(views: &[View]) -> Vec<(f64, f64)> {
     const HALF_DEG: f64 = 180.0;
     let line = |view: &View| view.angle_deg.rem_euclid(HALF_DEG);

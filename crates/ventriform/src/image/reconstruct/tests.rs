@@ -19,8 +19,9 @@ struct Ball {
 const FINE: usize = 4;
 
 impl Ball {
-    /// The counts of a pixel: the mean length, in pixels, of its rays within the ball. The detector is at `angle_deg` as
-    /// PS3.3 C.8.4.11 has it, written here by its words: 0 at the back, 90 at the left, columns as seen from outside.
+    /// The counts of a pixel: the mean length, in pixels, of its rays within the ball. The detector is at `angle_deg`
+    /// as PS3.3 C.8.4.11 has it, written here by its words: 0 at the back, 90 at the left, columns as seen from
+    /// outside.
     fn seen(&self, angle_deg: f64, column: usize, row: usize) -> f32 {
         let angle = angle_deg.to_radians();
         let [x, y, z] = self.centre;

@@ -1,10 +1,9 @@
 //! Which of several DICOM files hold slices, and which only accompany them.
 //!
-//! An export from a workstation or a medium holds more than a series: presentation states, reports,
-//! captures, key objects, projections, localizers. Of several files, those whose kind says that they
-//! hold no slices are set apart, and a warning names them. So are projections where slices lie beside them: slices can be
-//! made of them, but those of the camera's own software are there. A file that does not tell its kind stays, so that its
-//! damage is reported.
+//! An export from a workstation or a medium holds more than a series: presentation states, reports, captures, key
+//! objects, projections, localizers. Of several files, those whose kind says that they hold no slices are set apart,
+//! and a warning names them. So are projections where slices lie beside them: slices can be made of them, but those of
+//! the camera's own software are there. A file that does not tell its kind stays, so that its damage is reported.
 
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;

@@ -7,11 +7,9 @@
 //!    pixels.
 //! 2. What the object is, the same crate says. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
-//! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `projections`: those that
-//!    slices are reconstructed from; `posture`: what
-//!    else says how they lie in the patient.
-//!    `stack`: orders and places all other frames by their positions. `segments`: labels. `gate_series`: files or
-//!    series of one gate each.
+//! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `projections`: those
+//!    that slices are reconstructed from; `posture`: what else says how they lie in the patient. `stack`: orders and
+//!    places all other frames by their positions. `segments`: labels. `gate_series`: files or series of one gate each.
 //!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
 //! 4. `pixels`: checks the pixel format and decodes frame by frame ([`ventriform_dicom::codec`]).
 //! 5. `provenance`: patient, study, series, instances and acquisition; `rest_stress`: which scan of a study they name.

@@ -126,8 +126,8 @@ fn detector_starts(a: &Attributes, order: &ViewOrder) -> Result<Vec<f64>, ReadEr
     for detector in 0..detectors {
         let Some([start]) = of_detector(detector)? else {
             let reason = format!(
-                "the frames are of {detectors} detectors, and each must state its own angle in the Detector Information \
-                 Sequence (0054,0022); detector {} does not",
+                "the frames are of {detectors} detectors, and each must state its own angle in the Detector \
+                 Information Sequence (0054,0022); detector {} does not",
                 detector + 1
             );
             return Err(a.wrong(DETECTOR_START.name, "missing", reason));

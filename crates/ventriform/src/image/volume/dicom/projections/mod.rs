@@ -9,12 +9,12 @@
 //! 4. Collimators must be parallel, detectors alike and upright, pixels square.
 //!
 //! Guaranteed: statements about the geometry that contradict each other, or that no parallel projection in equal steps
-//! fits, are errors with the attribute's name; sizes are checked against the budget of a reconstruction before memory is
-//! taken.
+//! fits, are errors with the attribute's name; sizes are checked against the budget of a reconstruction before memory
+//! is taken.
 //!
-//! Not guaranteed: that the camera counts angles as the standard says. Where Image Orientation (Patient) of the detector
-//! says otherwise, a warning does. In a continuous rotation each view is taken for one at its stated angle. Table and
-//! detector positions are not used: nothing ties the axis of rotation to the patient.
+//! Not guaranteed: that the camera counts angles as the standard says. Where Image Orientation (Patient) of the
+//! detector says otherwise, a warning does. In a continuous rotation each view is taken for one at its stated angle.
+//! Table and detector positions are not used: nothing ties the axis of rotation to the patient.
 
 mod angles;
 mod windows;
@@ -106,8 +106,8 @@ impl Acquisition {
             rows_run_to_the_head(a, runs.first().map_or(first, angles::Run::start), warnings)?;
         if let Some(cited) = posture::not_supine(a) {
             warnings.push(format!(
-                "{cited}: the angles of the detector are counted from the patient's back, as PS3.3 C.8.4.11 has them. If \
-                 the camera counts them from the table, front and back are exchanged."
+                "{cited}: the angles of the detector are counted from the patient's back, as PS3.3 C.8.4.11 has them. \
+                 If the camera counts them from the table, front and back are exchanged."
             ));
         }
         Ok(Self {
@@ -310,8 +310,8 @@ fn check_detector(
             }
         }
         Some(other) => {
-            let reason = "only projections of collimators with parallel holes (PARA) are reconstructed; send the slices \
-                          that the camera's own software reconstructs";
+            let reason = "only projections of collimators with parallel holes (PARA) are reconstructed; send the \
+                          slices that the camera's own software reconstructs";
             return Err(a.wrong(COLLIMATOR_TYPE.name, other, reason.into()).into());
         }
     }
@@ -345,8 +345,8 @@ fn check_detector(
         && !corrected
     {
         warnings.push(format!(
-            "{} of detector {} is {offset}, and Corrected Image (0028,0051) does not say that it was made up for (COR): \
-             the axis of rotation is taken to be in the middle of the frames. `axis_offset_mm` states where it is.",
+            "{} of detector {} is {offset}, and Corrected Image (0028,0051) does not say that it was made up for \
+             (COR): the axis of rotation is taken to be in the middle of the frames. `axis_offset_mm` states where it is.",
             CENTRE_OF_ROTATION.name,
             detector + 1
         ));
@@ -354,8 +354,8 @@ fn check_detector(
     Ok(())
 }
 
-/// Whether the first row is that at the feet, by Image Orientation (Patient) of the first detector, whose angle at the first
-/// view is `start_deg`. One that fits no detector is said, and not used.
+/// Whether the first row is that at the feet, by Image Orientation (Patient) of the first detector, whose angle at the
+/// first view is `start_deg`. One that fits no detector is said, and not used.
 fn rows_run_to_the_head(
     a: &Attributes,
     start_deg: f64,
@@ -371,8 +371,8 @@ fn rows_run_to_the_head(
         return Ok(rows.z > 0.0);
     }
     warnings.push(format!(
-        "{} of the detector is {x0}\\{x1}\\{x2}\\{y0}\\{y1}\\{y2}, which a detector at the angle of {start_deg} degrees \
-         has not, whose columns run along {:.3}\\{:.3}\\0 and rows to the feet. The angle is used: compare left and \
+        "{} of the detector is {x0}\\{x1}\\{x2}\\{y0}\\{y1}\\{y2}, which a detector at the angle of {start_deg} \
+         degrees has not, whose columns run along {:.3}\\{:.3}\\0 and rows to the feet. The angle is used: compare left and \
          right of the result with the image.",
         DETECTOR_ORIENTATION.name,
         by_angle.x + 0.0,

@@ -58,7 +58,8 @@ pub(super) fn chosen(
     match holding[..] {
         [window] => {
             warnings.push(format!(
-                "Of the energy windows {list}, number {} was reconstructed, which holds the photopeak at {peak_kev} keV.",
+                "Of the energy windows {list}, number {} was reconstructed, which holds the photopeak at \
+                 {peak_kev} keV.",
                 window + 1
             ));
             Ok(window)

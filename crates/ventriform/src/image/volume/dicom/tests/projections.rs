@@ -35,7 +35,8 @@ impl Turn {
         }
     }
 
-    /// The frame of a detector at an angle: 0 at the back, 90 at the left side, as seen from outside with the head on top.
+    /// The frame of a detector at an angle: 0 at the back, 90 at the left side, as seen from outside with the head on
+    /// top.
     fn frame(angle_deg: f64, scale: f64) -> Vec<u16> {
         let angle = angle_deg.to_radians();
         let across = -angle.cos() * SPOT[0] + angle.sin() * SPOT[1];
