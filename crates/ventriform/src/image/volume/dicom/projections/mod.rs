@@ -346,7 +346,8 @@ fn check_detector(
     {
         warnings.push(format!(
             "{} of detector {} is {offset}, and Corrected Image (0028,0051) does not say that it was made up for \
-             (COR): the axis of rotation is taken to be in the middle of the frames. `axis_offset_mm` states where it is.",
+             (COR): the axis of rotation is taken to be in the middle of the frames. `axis_offset_mm` of `reconstruct` \
+             states where it is.",
             CENTRE_OF_ROTATION.name,
             detector + 1
         ));
@@ -372,8 +373,8 @@ fn rows_run_to_the_head(
     }
     warnings.push(format!(
         "{} of the detector is {x0}\\{x1}\\{x2}\\{y0}\\{y1}\\{y2}, which a detector at the angle of {start_deg} \
-         degrees has not, whose columns run along {:.3}\\{:.3}\\0 and rows to the feet. The angle is used: compare left and \
-         right of the result with the image.",
+         degrees has not, whose columns run along {:.3}\\{:.3}\\0 and rows to the feet. The angle is used: compare left \
+         and right of the result with the image.",
         DETECTOR_ORIENTATION.name,
         by_angle.x + 0.0,
         by_angle.y + 0.0
