@@ -180,6 +180,7 @@ if wait "${running[install]}"; then
   start clients scripts/check/clients.sh
   start crashes "$PYTHON" scripts/check/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dicom scripts/check/dicom.sh
+  start projections "$PYTHON" scripts/check/projections.py target/debug/ventriform
   start intake scripts/check/intake.sh
   start pacs scripts/check/pacs.sh
   start s3 scripts/check/s3.sh
@@ -199,6 +200,7 @@ if wait "${running[install]}"; then
   collect clients "generated Python and TypeScript clients"
   collect crashes "ten kills at random moments"
   collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
+  collect projections "projections against a reconstruction in numpy"
   collect intake "images received from dcmtk, pynetdicom and dicomweb-client"
   collect pacs "series fetched from Orthanc, objects delivered to it"
   collect s3 "files in S3 by moto"

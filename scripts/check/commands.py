@@ -38,7 +38,7 @@ import tomllib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from lib import gated_phantom
-from lib.nm import LPS, nm
+from lib.nm import LPS, nm, projections
 from lib.service import reader_profile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -147,6 +147,10 @@ class Scans:
                 check.save_as(path)
             elif name == "gated.dcm":
                 self.dicom(path, rest, 3, gates=8)
+            elif name == "raw.dcm":
+                image = nibabel.as_closest_canonical(nibabel.load(self.phantom(*rest) / "spect.nii.gz"))
+                spacing = float(np.linalg.norm(image.affine[:3, 0]))
+                projections(path, image.get_fdata()[::-1, ::-1], spacing, 4)
             elif name == "gated.nii.gz":
                 self.gated(path)
             elif found := re.fullmatch(r"(gate|g)(\d+)\.nii\.gz", name):

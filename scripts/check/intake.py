@@ -197,15 +197,15 @@ def send_by_other_programs(service, folder):
     mean = float(np.frombuffer(data.PixelData, np.uint16).mean())
     check(abs(found["intensity"]["mean"] - mean) < 1e-3, "mean of JPEG-LS")
 
-    # A projection is stored and shown with the reason; an object with another's UID is refused.
+    # A planar image is stored and shown with the reason; an object with another's UID is refused.
     association = service.associate(build_context(NuclearMedicineImageStorage, ExplicitVRLittleEndian))
-    projection = nuclear(20, "TOMO")
-    check(association.send_c_store(as_file(projection)).Status == 0, "pynetdicom: projections")
+    planar = nuclear(20, "STATIC")
+    check(association.send_c_store(as_file(planar)).Status == 0, "pynetdicom: planar image")
     other = nuclear(21)
     check(association.send_c_store(as_file(other)).Status == 0, "pynetdicom: NM")
     number += 2
     received = service.settled(number)
-    check(received[projection.SeriesInstanceUID]["state"] == "failed", "projections are no volume")
+    check(received[planar.SeriesInstanceUID]["state"] == "failed", "planar images are no volume")
     changed = as_file(other)
     changed.PixelData = bytes(len(changed.PixelData))
     answer = association.send_c_store(changed)

@@ -26,6 +26,7 @@ mod normals;
 mod output;
 mod parameter_args;
 mod phantom;
+mod reconstruct;
 mod resolution;
 mod segment;
 mod serve;
@@ -67,6 +68,7 @@ enum Command {
     Beat(Box<beat::BeatArgs>),
     Compare(Box<compare::CompareArgs>),
     Inspect(inspect::InspectArgs),
+    Reconstruct(reconstruct::ReconstructArgs),
     Measure(measure::MeasureArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
     Evaluate(Box<evaluate::EvaluateArgs>),
@@ -120,6 +122,7 @@ pub fn main() -> ExitCode {
         Command::Beat(args) => beat::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),

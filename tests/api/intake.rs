@@ -511,7 +511,7 @@ async fn two_series_of_a_study_one_at_stress_and_one_at_rest_become_one_comparis
 #[tokio::test(flavor = "multi_thread")]
 async fn what_makes_no_volume_is_shown_with_the_reason_until_it_is_forgotten() {
     let (app, address) = service(|_| {}).await;
-    let object = nuclear("1.2.3", 1, "TOMO");
+    let object = nuclear("1.2.3", 1, "STATIC");
     for _ in 0..2 {
         let mut scu = Scu::open(address);
         assert_eq!(
@@ -523,7 +523,7 @@ async fn what_makes_no_volume_is_shown_with_the_reason_until_it_is_forgotten() {
         let group = settled(&app, 1).await.remove(0);
         assert_eq!(group["state"], "failed");
         let error = &group["error"];
-        assert!(text(&error["detail"]).contains("projections"), "{error}");
+        assert!(text(&error["detail"]).contains("planar"), "{error}");
         assert!(text(&error["fix"]).contains("RECON TOMO"), "{error}");
         kept(app.data.path(), 1).await;
     }

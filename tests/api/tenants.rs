@@ -147,7 +147,7 @@ impl Belongings {
         let reader = sent(reader).await;
         let object = a.post("/dicom-web/studies");
         let object = object.header("content-type", "application/dicom");
-        sent(object.body(nuclear("1.2.3", 1, "TOMO").file())).await;
+        sent(object.body(nuclear("1.2.3", 1, "STATIC").file())).await;
         let received = a.json("/v1/intake").await;
         receiver.wait_for(3).await;
         let id = text(&job["id"]);

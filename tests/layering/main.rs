@@ -66,6 +66,7 @@ const LIBRARY_ROOMS: &[&str] = &[
     "mesh/decimate",
     "image/grid",
     "image/draw",
+    "image/reconstruct",
     "image/volume",
     "image/locate",
     "surface",

@@ -47,6 +47,7 @@ const PER_FRAME_GROUPS: Tag = tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE;
 /// Segment Sequence, whose items are counted like frames.
 const SEGMENT_SEQUENCE: Tag = tags::SEGMENT_SEQUENCE;
 
+/// The detectors of a camera, which are counted like frames as far as [`COUNTED_ATTRIBUTES`] go.
 const DETECTOR_PATH: &[Tag] = &[tags::DETECTOR_INFORMATION_SEQUENCE];
 /// Gated Information Sequence.
 const GATED_INFORMATION: Tag = tags::GATED_INFORMATION_SEQUENCE;
@@ -54,6 +55,7 @@ const GATED_INFORMATION: Tag = tags::GATED_INFORMATION_SEQUENCE;
 const DATA_INFORMATION: Tag = tags::DATA_INFORMATION_SEQUENCE;
 /// The R-R intervals of a gated acquisition, which are counted like frames.
 const GATED_DATA: &[Tag] = &[GATED_INFORMATION, DATA_INFORMATION];
+/// The rotations of a camera, which are counted like frames as far as [`COUNTED_ATTRIBUTES`] go.
 const ROTATION_PATH: &[Tag] = &[tags::ROTATION_INFORMATION_SEQUENCE];
 const PHARMACEUTICAL_PATH: &[Tag] = &[tags::RADIOPHARMACEUTICAL_INFORMATION_SEQUENCE];
 const PHARMACEUTICAL_CODE: &[Tag] = &[
@@ -339,10 +341,57 @@ attributes! {
         "Energy Window Lower Limit (0054,0014)";
     ENERGY_UPPER = ENERGY_WINDOW, tags::ENERGY_WINDOW_UPPER_LIMIT,
         "Energy Window Upper Limit (0054,0015)";
+    ANGULAR_VIEW_VECTOR = &[], tags::ANGULAR_VIEW_VECTOR, "Angular View Vector (0054,0090)";
+    ENERGY_WINDOWS = &[], tags::NUMBER_OF_ENERGY_WINDOWS, "Number of Energy Windows (0054,0011)";
+    DETECTORS = &[], tags::NUMBER_OF_DETECTORS, "Number of Detectors (0054,0021)";
+    ROTATIONS = &[], tags::NUMBER_OF_ROTATIONS, "Number of Rotations (0054,0051)";
+    DETECTOR_START = DETECTOR_PATH, tags::START_ANGLE, "Start Angle (0054,0200)";
+    DETECTOR_TILT = DETECTOR_PATH, tags::GANTRY_DETECTOR_TILT, "Gantry/Detector Tilt (0018,1120)";
+    COLLIMATOR_TYPE = DETECTOR_PATH, tags::COLLIMATOR_TYPE, "Collimator Type (0018,1181)";
+    ZOOM_FACTOR = DETECTOR_PATH, tags::ZOOM_FACTOR, "Zoom Factor (0028,0031)";
+    CENTRE_OF_ROTATION = DETECTOR_PATH, tags::CENTER_OF_ROTATION_OFFSET,
+        "Center of Rotation Offset (0018,1145)";
+    ROTATION_START = ROTATION_PATH, tags::START_ANGLE, "Start Angle (0054,0200)";
+    ANGULAR_STEP = ROTATION_PATH, tags::ANGULAR_STEP, "Angular Step (0018,1144)";
+    ROTATION_DIRECTION = ROTATION_PATH, tags::ROTATION_DIRECTION, "Rotation Direction (0018,1140)";
+    ROTATION_FRAMES = ROTATION_PATH, tags::NUMBER_OF_FRAMES_IN_ROTATION,
+        "Number of Frames in Rotation (0054,0053)";
+    FRAME_DURATION = ROTATION_PATH, tags::ACTUAL_FRAME_DURATION,
+        "Actual Frame Duration (0018,1242)";
     PET_ENERGY_LOWER = PET_ENERGY_WINDOW, tags::ENERGY_WINDOW_LOWER_LIMIT,
         "Energy Window Lower Limit (0054,0014)";
     PET_ENERGY_UPPER = PET_ENERGY_WINDOW, tags::ENERGY_WINDOW_UPPER_LIMIT,
         "Energy Window Upper Limit (0054,0015)";
+}
+
+/// What is kept of every detector, rotation and energy window. Of the second on the number of the item, from 0, is that
+/// of the frame; the first stands for all that are read without one.
+const COUNTED_ATTRIBUTES: &[Attribute] = &[
+    DETECTOR_START,
+    DETECTOR_TILT,
+    COLLIMATOR_TYPE,
+    ZOOM_FACTOR,
+    CENTRE_OF_ROTATION,
+    ROTATION_START,
+    ANGULAR_STEP,
+    ROTATION_DIRECTION,
+    SCAN_ARC,
+    ROTATION_FRAMES,
+    FRAME_DURATION,
+    ENERGY_LOWER,
+    ENERGY_UPPER,
+];
+
+/// The attribute of an item after the first with `tag` inside the sequences `open`, and the item's number from 0.
+fn of_later_item(open: &[(Tag, usize)], tag: Tag) -> Option<(Attribute, Option<usize>)> {
+    let ((_, items), inner) = open.split_first()?;
+    if *items < 2 || inner.iter().any(|(_, items)| *items != 1) {
+        return None;
+    }
+    let path = || open.iter().map(|(tag, _)| tag);
+    let found = |a: &&Attribute| a.tag == tag && a.path.iter().eq(path());
+    let attribute = COUNTED_ATTRIBUTES.iter().find(found)?;
+    Some((*attribute, Some(items - 1)))
 }
 
 /// Whether `tag` is a sequence that holds a needed attribute.
@@ -367,6 +416,9 @@ impl Attribute {
             let interval = (outer.min(inner) == 1).then(|| outer.max(inner) - 1)?;
             let mut of_interval = WANTED_ATTRIBUTES.iter().filter(|a| a.path == GATED_DATA);
             return Some((*of_interval.find(|a| a.tag == tag)?, Some(interval)));
+        }
+        if let Some(later) = of_later_item(open, tag) {
+            return Some(later);
         }
         let (frame, outer) = match open.first() {
             Some((many @ (PER_FRAME_GROUPS | SEGMENT_SEQUENCE), items)) => {
@@ -541,6 +593,43 @@ impl Attributes {
     /// attribute is absent or empty.
     pub fn texts(&self, attribute: Attribute) -> Vec<String> {
         self.texts_of(attribute, None)
+    }
+
+    /// As [`Attributes::texts`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
+    pub fn texts_of_item(&self, attribute: Attribute, item: usize) -> Vec<String> {
+        let item = (item > 0).then_some(item);
+        if self.states(attribute, item) {
+            self.texts_of(attribute, item)
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// As [`Attributes::shorts`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
+    pub fn shorts_of_item(&self, attribute: Attribute, item: usize) -> Vec<u16> {
+        let item = (item > 0).then_some(item);
+        if self.states(attribute, item) {
+            self.shorts_of(attribute, item)
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// As [`Attributes::decimals`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
+    ///
+    /// # Errors
+    /// As [`Attributes::decimals`].
+    pub fn decimals_of_item<const N: usize>(
+        &self,
+        attribute: Attribute,
+        item: usize,
+    ) -> Result<Option<[f64; N]>, ReadError> {
+        let item = (item > 0).then_some(item);
+        if self.states(attribute, item) {
+            self.decimals_of(attribute, item)
+        } else {
+            Ok(None)
+        }
     }
 
     /// As [`Attributes::texts`], for stored frame number `frame`, from 0.

@@ -141,7 +141,10 @@ impl FrameOrder {
 
 /// Checks that the Frame Increment Pointer, if present, names none but `vectors`. Some writers name further
 /// vectors; those are accepted if all of their numbers are the same.
-fn check_pointer(attributes: &Attributes, vectors: &[Attribute]) -> Result<(), ReadError> {
+pub(super) fn check_pointer(
+    attributes: &Attributes,
+    vectors: &[Attribute],
+) -> Result<(), ReadError> {
     let pointer = attributes.shorts(FRAME_POINTER);
     let (stated, _) = pointer.as_chunks::<2>();
     let idle = |tag: &[u16; 2]| {

@@ -1,4 +1,4 @@
-//! The kind of a DICOM object, and advice on what to send instead of one that holds no volume.
+//! The kind of a DICOM object, and advice on what to send instead of one that holds no volume and none can be made of.
 
 use super::ReadError;
 use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SERIES_TYPE, SOP_CLASS, UNITS, clip};
@@ -7,15 +7,21 @@ use dicom_dictionary_std::StandardSopClassDictionary;
 
 /// Advice on objects that can be sent.
 const READABLE_ADVICE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
-    RECON TOMO or RECON GATED TOMO, an Enhanced PET, CT or MR image, all files of one PET, CT or MR \
-    series (as several files or as one zip), or a Segmentation.";
+    RECON TOMO or RECON GATED TOMO, or its projections (TOMO or GATED TOMO), an Enhanced PET, CT or MR \
+    image, all files of one PET, CT or MR series (as several files or as one zip), or a Segmentation.";
 
-/// The objects that hold slices.
+/// The objects that hold slices, or of which slices can be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Nuclear Medicine Image with the Image Type RECON TOMO or RECON GATED TOMO: the frames are
     /// ordered by vectors.
     Nuclear {
+        /// Whether it holds several gates.
+        gated: bool,
+    },
+    /// Nuclear Medicine Image with the Image Type TOMO or GATED TOMO: the frames are projections acquired around the
+    /// patient, ordered by vectors, of which slices can be reconstructed.
+    Projections {
         /// Whether it holds several gates.
         gated: bool,
     },
@@ -189,6 +195,7 @@ impl Kind {
     pub fn noun(self) -> &'static str {
         match self {
             Self::Nuclear { .. } => "a Nuclear Medicine image",
+            Self::Projections { .. } => "Nuclear Medicine projections",
             Self::Slice => "a slice of a PET, CT or MR series",
             Self::Enhanced => "an Enhanced image",
             Self::Segmentation => "a Segmentation",
@@ -279,7 +286,7 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, ReadE
         return Err(attributes.missing(IMAGE_TYPE));
     }
     let shown = image_type.get(2).map_or("", String::as_str);
-    let is_map = shown.starts_with("RECON") && image_type.iter().any(|v| v == "TRANSMISSION");
+    let is_map = shown.contains("TOMO") && image_type.iter().any(|v| v == "TRANSMISSION");
     let named = if shown.is_empty() || is_map {
         image_type.join("\\")
     } else {
@@ -290,7 +297,8 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, ReadE
             file: attributes.file.clone(),
             image_type: clip(&named),
             reason,
-            fix: "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO).",
+            fix: "Give the reconstructed slices (Image Type RECON TOMO or RECON GATED TOMO), or the projections that \
+                  they are made of (TOMO or GATED TOMO).",
         })
     };
     if is_map {
@@ -302,12 +310,11 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, ReadE
     match shown {
         "RECON TOMO" => Ok(Kind::Nuclear { gated: false }),
         "RECON GATED TOMO" => Ok(Kind::Nuclear { gated: true }),
-        "TOMO" | "GATED TOMO" => {
-            refuse("its frames are projections acquired around the patient, not slices")
-        }
+        "TOMO" => Ok(Kind::Projections { gated: false }),
+        "GATED TOMO" => Ok(Kind::Projections { gated: true }),
         "STATIC" | "DYNAMIC" | "GATED" | "WHOLE BODY" => {
             refuse("its frames are planar images, not slices")
         }
-        _ => refuse("only RECON TOMO and RECON GATED TOMO contain reconstructed slices"),
+        _ => refuse("only RECON TOMO, RECON GATED TOMO, TOMO and GATED TOMO are or become slices"),
     }
 }

@@ -7,9 +7,9 @@
 //!    sequences and rejects lengths beyond the size of the file. Elements that a program wrote without knowing them,
 //!    and values in another [`representation`] than the standard's are read, too.
 //! 3. [`kind`]: what the object is.
-//! 4. [`frames`]: the order of the frames of a Nuclear Medicine Image by its vectors; [`real_world`]: how stored
-//!    numbers become values; [`fragments`]: which pieces of compressed pixels make a frame;
-//!    [`volumes`]: which frames at one place belong to one volume.
+//! 4. [`frames`]: the order of the frames of a Nuclear Medicine Image by its vectors; [`views`]: the same of
+//!    projections; [`real_world`]: how stored numbers become values; [`fragments`]: which pieces of compressed pixels
+//!    make a frame; [`volumes`]: which frames at one place belong to one volume.
 //!
 //! Guaranteed: no memory is taken for a stated length before the file was found long enough for it; at most 16 MiB of
 //! values are held. Where the parser panics, the file is damaged.
@@ -25,6 +25,7 @@ pub mod representation;
 pub mod scan;
 pub mod syntax;
 mod unknown;
+pub mod views;
 pub mod volumes;
 
 #[cfg(test)]

@@ -136,8 +136,8 @@ pub fn scan(
     })
 }
 
-/// Checks whether the object whose data set begins at the position of `source` is of a kind that holds
-/// slices, as far as it tells.
+/// The kind of the object whose data set begins at the position of `source`, which must be one that is read; `None` if
+/// it does not tell.
 ///
 /// # Errors
 /// As [`Kind::from_attributes`]; for one that names no class, as [`attributes`].
@@ -145,12 +145,12 @@ pub fn check_kind(
     source: &mut dyn Bytes,
     syntax: &Syntax,
     goes_on: &dyn Fn() -> bool,
-) -> Result<(), ReadError> {
+) -> Result<Option<Kind>, ReadError> {
     let mut walk = Walk::new(source, syntax);
     match walk_to_pixels(source, syntax, &mut walk, goes_on) {
         Err(error @ ReadError::Stopped) => Err(error),
-        _ if walk.attributes.names_a_class() => Kind::from_attributes(&walk.attributes).map(|_| ()),
-        found => found.map(|_| ()),
+        _ if walk.attributes.names_a_class() => Kind::from_attributes(&walk.attributes).map(Some),
+        found => found.map(|_| None),
     }
 }
 

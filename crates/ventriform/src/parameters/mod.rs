@@ -1,10 +1,11 @@
-//! The parameters of a model, of a fit, of a beat, of a comparison and of normal limits, by the names that users give
-//! them.
+//! The parameters of a model, of a fit, of a beat, of a comparison, of normal limits and of a reconstruction, by the
+//! names that users give them.
 //!
-//! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`] and [`NORMALS_SPECS`], define names,
-//! types, ranges, defaults and help texts for the command line, query strings, the JSON of jobs and the OpenAPI
-//! document. Text or JSON goes in; [`ModelParameters`], [`FitParameters`] or [`WithFit`] come out, with every value of
-//! the right type and in its range, or a [`ParameterError`] with the name of the first invalid parameter.
+//! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`], [`NORMALS_SPECS`] and
+//! [`RECONSTRUCTION_SPECS`], define names, types, ranges, defaults and help texts for the command line, query strings,
+//! the JSON of jobs and the OpenAPI document. Text or JSON goes in; [`ModelParameters`], [`FitParameters`] or
+//! [`WithFit`] come out, with every value of the right type and in its range, or a [`ParameterError`] with the name of
+//! the first invalid parameter.
 
 mod beat;
 mod calibration;
@@ -18,6 +19,7 @@ mod input;
 mod kind;
 mod model;
 mod normals;
+mod reconstruction;
 mod resolution;
 #[cfg(feature = "schema")]
 mod schema;
@@ -34,6 +36,7 @@ pub use input::RawValue;
 pub use kind::Kind;
 pub use model::ModelParameters;
 pub use normals::{CohortCase, NORMALS_SPECS, NormalsChoice, NormalsParameters};
+pub use reconstruction::RECONSTRUCTION_SPECS;
 pub use resolution::{ResolutionChoice, ResolutionParameters};
 #[cfg(feature = "schema")]
 pub use schema::schema_of;

@@ -17,6 +17,8 @@ pub enum FileFormat {
     Nifti2Pair,
     /// DICOM Nuclear Medicine Image, all slices in one file.
     DicomNm,
+    /// DICOM Nuclear Medicine Image of projections, of which slices were reconstructed.
+    DicomProjections,
     /// DICOM Enhanced PET, CT or MR image: all slices in one file, each with its position.
     DicomEnhanced,
     /// PET, CT or MR slices, each in a DICOM file.
@@ -38,6 +40,7 @@ impl FileFormat {
             FileFormat::Nifti2 => "NIfTI-2",
             FileFormat::Nifti2Pair => "NIfTI-2 pair",
             FileFormat::DicomNm => "DICOM NM",
+            FileFormat::DicomProjections => "DICOM NM projections",
             FileFormat::DicomEnhanced => "DICOM enhanced",
             FileFormat::DicomSeries => "DICOM series",
             FileFormat::DicomSeg => "DICOM SEG",

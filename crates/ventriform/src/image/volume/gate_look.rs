@@ -250,7 +250,7 @@ impl Images {
         let mut images = Self::empty(grid, frames, fine);
         for frame in 0..frames {
             let part = monitor.part(frame, frames);
-            images.add(|take| file.stream_frame(frame, take, &part))?;
+            images.add(|take| file.stream_coarse(frame, take, &part))?;
         }
         Ok(images)
     }

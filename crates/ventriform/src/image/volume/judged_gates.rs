@@ -115,6 +115,23 @@ impl OpenVolume for JudgedGates {
         self.file.stream_frame(frame, take, monitor)
     }
 
+    fn stream_coarse(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        self.file.stream_coarse(frame, take, monitor)
+    }
+
+    fn decode_sum(
+        &mut self,
+        frames: &[usize],
+        monitor: &Monitor,
+    ) -> Option<Result<Decoded, VolumeError>> {
+        self.file.decode_sum(frames, monitor)
+    }
+
     fn stream_labels(
         &mut self,
         frame: usize,

@@ -1,4 +1,4 @@
-//! Reads reconstructed volumes from NIfTI and DICOM files, and makes phantoms.
+//! Reads volumes from NIfTI and DICOM files, reconstructed ones or projections, and makes phantoms.
 //!
 //! In: files as a scanner, a workstation or a user wrote them. Out: voxel values as `f32`, an
 //! invertible map from voxel indices to LPS millimetres, and the [`VolumeFacts`] that let a person
@@ -10,7 +10,8 @@
 //!    the format by the content. A name only tells which `.img` belongs to a `.hdr` among many files.
 //!    `foreign`: formats that are not read are named, with how to convert them.
 //! 3. [`nifti`] or `dicom`: checks the header field by field.
-//! 4. `decode`: decodes the voxels in portions directly into the result.
+//! 4. `decode`: decodes the voxels in portions directly into the result; of projections,
+//!    [`reconstruct`](crate::image::reconstruct) makes them. `reconstructed`: as the caller says.
 //! 5. `summary`: figures over the values, and whether they look like labels.
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an error
@@ -75,6 +76,7 @@ pub mod preview;
 mod provenance;
 mod read;
 mod recognise;
+mod reconstructed;
 mod segment;
 mod source;
 mod summary;
@@ -101,6 +103,7 @@ pub use read::{
     HeldGates, hold_gates, hold_same_voxels, inspect, labels_are_rounded, preview_files,
     provenance, read, read_gates, read_segment, segments, surface, voxels_of_label,
 };
+pub use reconstructed::{Reconstructed, reconstructed};
 pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;
 pub use summary::summarise;

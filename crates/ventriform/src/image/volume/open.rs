@@ -159,6 +159,26 @@ pub(super) trait OpenVolume {
         monitor: &Monitor,
     ) -> Result<(), VolumeError>;
 
+    /// As [`OpenVolume::stream_frame`], with values from which volumes can be told apart by coarse blocks: those that are
+    /// made from something else may be made quickly.
+    fn stream_coarse(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        self.stream_frame(frame, take, monitor)
+    }
+
+    /// The sum of these volumes, if something better is known than to add their values; `None` otherwise.
+    fn decode_sum(
+        &mut self,
+        _frames: &[usize],
+        _monitor: &Monitor,
+    ) -> Option<Result<Decoded, VolumeError>> {
+        None
+    }
+
     /// As [`OpenVolume::stream_frame`], with the exact whole numbers of the voxels; fractions and missing
     /// values are [`NO_LABEL`].
     fn stream_labels(
@@ -308,15 +328,11 @@ pub(super) fn first_summed(file: &dyn OpenVolume) -> usize {
 fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeError> {
     let frames = file.header().frames;
     let left_out = file.left_out();
-    let first = first_summed(file);
-    let mut sum = file.decode_frame(first, monitor)?;
-    for frame in (first + 1..frames).filter(|frame| !left_out.has(*frame)) {
-        let mut add = |first: usize, part: &[f32]| {
-            let voxels = sum.voxels[first..].iter_mut();
-            voxels.zip(part).for_each(|(sum, voxel)| *sum += voxel);
-        };
-        file.stream_frame(frame, &mut add, monitor)?;
-    }
+    let kept: Vec<usize> = (0..frames).filter(|frame| !left_out.has(*frame)).collect();
+    let mut sum = match file.decode_sum(&kept, monitor) {
+        Some(sum) => sum?,
+        None => added(file, &kept, monitor)?,
+    };
     let mut tally = Tally::default();
     tally.add_portion(&sum.voxels);
     sum.tally = tally;
@@ -326,6 +342,24 @@ fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeEr
         frames - left_out.count(),
         frames - 1
     ));
+    Ok(sum)
+}
+
+/// The volumes `kept`, their values added.
+fn added(
+    file: &mut dyn OpenVolume,
+    kept: &[usize],
+    monitor: &Monitor,
+) -> Result<Decoded, VolumeError> {
+    let first = kept.first().copied().unwrap_or(0);
+    let mut sum = file.decode_frame(first, monitor)?;
+    for frame in kept.iter().skip(1) {
+        let mut add = |first: usize, part: &[f32]| {
+            let voxels = sum.voxels[first..].iter_mut();
+            voxels.zip(part).for_each(|(sum, voxel)| *sum += voxel);
+        };
+        file.stream_frame(*frame, &mut add, monitor)?;
+    }
     Ok(sum)
 }
 

@@ -20,6 +20,7 @@ use super::{
 use crate::base::progress::Monitor;
 use crate::image::draw::Image;
 use crate::image::grid::gates::GATE_COUNTS;
+use crate::image::reconstruct::Reconstruction;
 use crate::mesh::TriMesh;
 use crate::mesh::files::MeshStatement;
 use std::cell::RefCell;
@@ -361,7 +362,11 @@ pub fn surface(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Option<(TriMesh, Reading)>, VolumeError> {
-    let mut file = open_as(files, stated, limits, monitor)?.file;
+    let told = Told {
+        mesh: *stated,
+        ..Told::default()
+    };
+    let mut file = open_as(files, &told, limits, monitor)?.file;
     let Some(mesh) = file.surface().cloned() else {
         return Ok(None);
     };
@@ -428,10 +433,19 @@ pub fn preview_files(
 }
 
 /// A volume whose header was checked.
-struct Opened {
-    file: Box<dyn OpenVolume>,
+pub(super) struct Opened {
+    pub(super) file: Box<dyn OpenVolume>,
     /// The files that were left out.
-    notes: Vec<String>,
+    pub(super) notes: Vec<String>,
+}
+
+/// What a caller tells of files that are no volumes yet.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Told {
+    /// Of a mesh.
+    pub(super) mesh: MeshStatement,
+    /// How projections are reconstructed.
+    pub(super) how: Reconstruction,
 }
 
 /// Recognises the format of `files` and checks the header. Archives stand for the files in them.
@@ -440,7 +454,7 @@ fn open(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
-    open_as(files, &MeshStatement::default(), limits, monitor)
+    open_as(files, &Told::default(), limits, monitor)
 }
 
 /// As [`open()`], with the volumes that are taken for gates looked at.
@@ -457,19 +471,19 @@ fn open_judged(
     })
 }
 
-/// As [`open()`], with what the caller states of a mesh.
-fn open_as(
+/// As [`open()`], with what the caller tells of the files.
+pub(super) fn open_as(
     files: &[VolumeFile],
-    stated: &MeshStatement,
+    told: &Told,
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
-    open_named(files, stated, limits, monitor).map_err(|error| error.with_path(files))
+    open_named(files, told, limits, monitor).map_err(|error| error.with_path(files))
 }
 
 fn open_named(
     files: &[VolumeFile],
-    stated: &MeshStatement,
+    told: &Told,
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
@@ -496,8 +510,8 @@ fn open_named(
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
         Recognised::Gates(files) => Box::new(GateFiles::open(&files, limits)?),
-        Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
-        Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits, monitor)?),
+        Recognised::Dicom(files) => Box::new(DicomFile::open(&files, &told.how, limits, monitor)?),
+        Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, &told.mesh, limits, monitor)?),
         Recognised::Arrays(file) => Box::new(ArrayFile::open(file, limits)?),
     };
     Ok(Opened {

@@ -1,9 +1,9 @@
 //! Which of several DICOM files hold slices, and which only accompany them.
 //!
-//! An export from a workstation or a medium holds more than a series: presentation states, reports,
-//! captures, key objects, projections, localizers. Of several files, those whose kind says that they
-//! hold no slices are set apart, and a warning names them. A file that does not tell its kind stays,
-//! so that its damage is reported.
+//! An export from a workstation or a medium holds more than a series: presentation states, reports, captures, key
+//! objects, projections, localizers. Of several files, those whose kind says that they hold no slices are set apart,
+//! and a warning names them. So are projections where slices lie beside them: slices can be made of them, but those of
+//! the camera's own software are there. A file that does not tell its kind stays, so that its damage is reported.
 
 use super::super::VolumeError;
 use super::super::limits::ReadLimits;
@@ -41,7 +41,7 @@ pub(super) fn set_apart<'a>(
         sorted.slices.push(file);
         return Ok(sorted);
     }
-    let mut others = Vec::new();
+    let (mut others, mut projections) = (Vec::new(), Vec::new());
     for file in files {
         monitor.check()?;
         match check_kind(file, limits, monitor) {
@@ -49,8 +49,14 @@ pub(super) fn set_apart<'a>(
                 others.push(error);
             }
             Err(error @ VolumeError::Cancelled(_)) => return Err(error),
+            Ok(Some(Kind::Projections { .. })) => projections.push(*file),
             _ => sorted.slices.push(file),
         }
+    }
+    if sorted.slices.is_empty() {
+        sorted.slices = projections;
+    } else {
+        others.extend(projections.into_iter().map(beside_slices));
     }
     if sorted.slices.is_empty()
         && let Some(first) = others.first()
@@ -70,7 +76,17 @@ pub(super) fn set_apart<'a>(
     Ok(sorted)
 }
 
-/// Whether the object in `file` can hold slices.
+/// What is said of projections that lie beside slices.
+fn beside_slices(file: &VolumeFile) -> VolumeError {
+    VolumeError::NotSlices {
+        file: file.name().into(),
+        image_type: "TOMO".into(),
+        reason: "its frames are projections, and reconstructed slices lie beside them",
+        fix: "Send the projections alone to have slices made of them.",
+    }
+}
+
+/// The kind of the object in `file`, which can hold slices or become them; `None` if it does not tell.
 ///
 /// # Errors
 /// That it cannot, or why that is unknown.
@@ -78,7 +94,7 @@ fn check_kind(
     file: &VolumeFile,
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<(), VolumeError> {
+) -> Result<Option<Kind>, VolumeError> {
     match StoredDataSet::find(file, limits) {
         Ok(found) => {
             let mut source = found.open(file, limits.unpacked_bytes)?;
@@ -93,8 +109,7 @@ fn check_kind(
             Some(class) => {
                 let mut attributes = Attributes::new(file.name(), Endianness::Little);
                 attributes.media_class = Some(class);
-                Kind::from_attributes(&attributes)?;
-                Ok(())
+                Ok(Some(Kind::from_attributes(&attributes)?))
             }
             None => Err(error),
         },

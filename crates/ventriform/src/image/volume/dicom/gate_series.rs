@@ -15,6 +15,7 @@ use super::one_scan::{Reach, ScanStatement, contradiction};
 use super::{Content, DicomFile, ScannedFile, StoredSlice, VolumeError, timing};
 use crate::base::progress::Monitor;
 use crate::image::grid::gates::{GATE_COUNTS, SAME_PLACE_MM};
+use crate::image::reconstruct::Reconstruction;
 use crate::image::volume::gate_timing::GateTiming;
 use crate::image::volume::limits::ReadLimits;
 use crate::image::volume::source::VolumeFile;
@@ -127,7 +128,7 @@ pub(super) fn open(
         }
         places.push(Place::from_attributes(a));
         said.push(ScanStatement::from_attributes(a));
-        let gate = DicomFile::of_scan(file, scanned, limits)?;
+        let gate = DicomFile::of_scan(file, scanned, &Reconstruction::default(), limits)?;
         if gate.volumes != 1 {
             return Ok(Joined::No);
         }

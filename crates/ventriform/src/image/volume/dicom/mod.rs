@@ -7,10 +7,9 @@
 //!    pixels.
 //! 2. What the object is, the same crate says. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
-//! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `posture`: what
-//!    else says how they lie in the patient.
-//!    `stack`: orders and places all other frames by their positions. `segments`: labels. `gate_series`: files or
-//!    series of one gate each.
+//! 3. The frames of a Nuclear Medicine Image are ordered by its vectors; `geometry` places them; `projections`: those
+//!    that slices are reconstructed from; `posture`: what else says how they lie in the patient. `stack`: orders and
+//!    places all other frames by their positions. `segments`: labels. `gate_series`: files or series of one gate each.
 //!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
 //! 4. `pixels`: checks the pixel format and decodes frame by frame ([`ventriform_dicom::codec`]).
 //! 5. `provenance`: patient, study, series, instances and acquisition; `rest_stress`: which scan of a study they name.
@@ -30,6 +29,7 @@ mod header;
 pub(crate) mod one_scan;
 mod pixels;
 mod posture;
+mod projections;
 mod provenance;
 mod rest_stress;
 mod scans;
@@ -47,11 +47,12 @@ pub(super) use ventriform_dicom::read::syntax::is_dicom;
 use self::gate_series::{Joined, Place};
 use self::one_scan::{Reach, ScanStatement, contradiction};
 use self::pixels::{Pixels, too_many_voxels};
+use self::projections::Acquisition;
 use self::scans::Scans;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
 use self::stored::StoredDataSet;
-use super::decode::Figures;
+use super::decode::{DataType, Figures};
 use super::facts::{FileFormat, LengthUnit};
 use super::gate_timing::GateTiming;
 use super::limits::ReadLimits;
@@ -61,6 +62,7 @@ use super::summary::Tally;
 use super::{Provenance, Segment, VolumeError};
 use crate::base::progress::{Monitor, Stage};
 use crate::image::grid::gates::GATE_COUNTS;
+use crate::image::reconstruct::Reconstruction;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::mem;
@@ -107,6 +109,8 @@ enum Content {
     Slices(Vec<StoredSlice>),
     /// Segments on a grid.
     Labels(Segments),
+    /// Projections, of which each volume is made.
+    Projections(Acquisition),
 }
 
 /// A stored frame and the slice that it holds.
@@ -147,6 +151,7 @@ impl DicomFile {
     /// Reads and checks the attributes of `files`, of which there is at least one.
     pub(super) fn open(
         files: &[&VolumeFile],
+        how: &Reconstruction,
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
@@ -155,7 +160,7 @@ impl DicomFile {
         files.sort_by(|a, b| a.name().cmp(b.name()));
         let sorted = company::set_apart(&files, limits, monitor)?;
         let mut opened = match &sorted.slices[..] {
-            [file] => Self::single(file, limits, monitor)?,
+            [file] => Self::single(file, how, limits, monitor)?,
             slices => match gate_series::open(slices, limits, monitor)? {
                 Joined::Gates(gates) => *gates,
                 Joined::Contradiction(reason) => return Err(not_one(slices.len(), reason)),
@@ -168,17 +173,19 @@ impl DicomFile {
 
     fn single(
         file: &VolumeFile,
+        how: &Reconstruction,
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
         let scanned = ScannedFile::open(file, limits, monitor)?;
-        Self::of_scan(file, scanned, limits)
+        Self::of_scan(file, scanned, how, limits)
     }
 
     /// The volumes of one file.
     fn of_scan(
         file: &VolumeFile,
         scanned: ScannedFile,
+        how: &Reconstruction,
         limits: &ReadLimits,
     ) -> Result<Self, VolumeError> {
         let ScannedFile { scan, pixels } = scanned;
@@ -205,6 +212,12 @@ impl DicomFile {
                 let stored = sorted(stored.collect());
                 let placement = geometry::place(a, [columns, rows, slices])?;
                 (Content::Slices(stored), volumes, slices, placement)
+            }
+            Kind::Projections { gated } => {
+                let raw = Acquisition::new(a, &pixels, gated, how, &mut warnings)?;
+                let placement = raw.placement(a)?;
+                let (volumes, slices) = (raw.gates(), rows);
+                (Content::Projections(raw), volumes, slices, placement)
             }
             Kind::Segmentation => {
                 let (segments, placement) = Segments::new(a, &pixels, limits.voxels)?;
@@ -251,13 +264,28 @@ impl DicomFile {
         };
         warnings.extend(attenuation_warning(a));
         let enhanced_gates = scan.kind == Kind::Enhanced && timing::has_gates(a, pixels.frames);
-        let gated = volumes > 1 && (scan.kind == Kind::Nuclear { gated: true } || enhanced_gates);
+        let nuclear_gates = matches!(
+            scan.kind,
+            Kind::Nuclear { gated: true } | Kind::Projections { gated: true }
+        );
+        let gated = volumes > 1 && (nuclear_gates || enhanced_gates);
         let timings = if enhanced_gates {
             vec![timing::of_frames(a)?]
         } else {
             timing::gate_timings(a)?
         };
-        let voxels = (columns * rows) as u64 * slices as u64;
+        let mut provenance = Provenance::from_attributes(a);
+        let shape = match &content {
+            Content::Projections(raw) => {
+                let [method, filter] = raw.derivation();
+                provenance.reconstruction_method = Some(method);
+                provenance.convolution_kernel = Some(filter);
+                provenance.scan_arc = Some(format!("{:.0}", raw.arc_deg));
+                raw.shape()
+            }
+            _ => [columns, rows, slices],
+        };
+        let voxels = (shape[0] * shape[1]) as u64 * slices as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(a, voxels, limits.voxels));
         }
@@ -265,6 +293,7 @@ impl DicomFile {
             name: file.name().into(),
             format: match scan.kind {
                 Kind::Nuclear { .. } => FileFormat::DicomNm,
+                Kind::Projections { .. } => FileFormat::DicomProjections,
                 Kind::Enhanced => FileFormat::DicomEnhanced,
                 Kind::Slice => FileFormat::DicomSeries,
                 Kind::Segmentation => FileFormat::DicomSeg,
@@ -273,9 +302,9 @@ impl DicomFile {
             volumes,
             gated,
             timings,
-            shape: [columns, rows, slices],
+            shape,
             placement,
-            provenance: Provenance::from_attributes(a),
+            provenance,
             parts: vec![pixels],
             instances: Vec::new(),
             gate_scans: Vec::new(),
@@ -389,6 +418,23 @@ impl DicomFile {
                 Ok((figures.tally(), figures.warnings()))
             }
             Content::Labels(segments) => self.decode_labels(segments, take, monitor),
+            Content::Projections(raw) => {
+                let volumes = volume.map_or(0..self.volumes, |volume| volume..volume + 1);
+                let count = volumes.len();
+                let (mut tally, mut warnings) = (Tally::default(), Vec::new());
+                for (done, volume) in volumes.enumerate() {
+                    let part = monitor.part(done, count);
+                    let (voxels, own) = raw.volume(&self.parts[0], &[volume], false, &part)?;
+                    tally.add_portion(&voxels);
+                    take(0, &voxels);
+                    warnings.extend(
+                        own.into_iter()
+                            .filter(|own| !warnings.contains(own))
+                            .collect::<Vec<_>>(),
+                    );
+                }
+                Ok((tally, warnings))
+            }
         }
     }
 }
@@ -817,6 +863,10 @@ impl OpenVolume for DicomFile {
         let first = &self.parts[0];
         let mut file_shape = self.shape.to_vec();
         file_shape.extend((self.volumes > 1).then_some(self.volumes));
+        let made = matches!(self.content, Content::Projections(_));
+        if made {
+            file_shape = vec![first.extent[0], first.extent[1], first.frames];
+        }
         let scaling = first.scaling(0);
         let mut every = self
             .parts
@@ -827,7 +877,7 @@ impl OpenVolume for DicomFile {
             format: self.format,
             byte_order: first.byte_order,
             compressed: self.parts.iter().any(Pixels::is_gzip),
-            data_type: first.data_type.name(),
+            data_type: if made { DataType::F32 } else { first.data_type }.name(),
             // Slices may be scaled each in its own way; then there is no common factor.
             scaling: scaling.filter(|_| every.all(|other| other == scaling)),
             file_shape,
@@ -885,7 +935,7 @@ impl OpenVolume for DicomFile {
     fn segments(&self) -> &[Segment] {
         match &self.content {
             Content::Labels(segments) => &segments.described,
-            Content::Slices(_) => &[],
+            Content::Slices(_) | Content::Projections(_) => &[],
         }
     }
 
@@ -922,6 +972,41 @@ impl OpenVolume for DicomFile {
         monitor: &Monitor,
     ) -> Result<(), VolumeError> {
         self.stream(Some(frame), take, monitor).map(|_| ())
+    }
+
+    fn stream_coarse(
+        &mut self,
+        frame: usize,
+        take: &mut dyn FnMut(usize, &[f32]),
+        monitor: &Monitor,
+    ) -> Result<(), VolumeError> {
+        let Content::Projections(raw) = &self.content else {
+            return self.stream_frame(frame, take, monitor);
+        };
+        let (voxels, _) = raw.volume(&self.parts[0], &[frame], true, monitor)?;
+        take(0, &voxels);
+        Ok(())
+    }
+
+    /// Of projections, the counts are added before an image is made of them: noise then weighs less.
+    fn decode_sum(
+        &mut self,
+        frames: &[usize],
+        monitor: &Monitor,
+    ) -> Option<Result<Decoded, VolumeError>> {
+        let Content::Projections(raw) = &self.content else {
+            return None;
+        };
+        let made = raw.volume(&self.parts[0], frames, false, monitor);
+        Some(made.map(|(voxels, warnings)| {
+            let mut tally = Tally::default();
+            tally.add_portion(&voxels);
+            Decoded {
+                voxels,
+                tally,
+                warnings,
+            }
+        }))
     }
 
     fn decode_all(

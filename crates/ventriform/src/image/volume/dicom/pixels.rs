@@ -388,7 +388,7 @@ fn check_colours(a: &Attributes) -> Result<(), ReadError> {
 fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, ReadError> {
     let frames = match a.decimals(NUMBER_OF_FRAMES)? {
         Some([frames]) => frames,
-        None if matches!(kind, Kind::Nuclear { .. }) => {
+        None if matches!(kind, Kind::Nuclear { .. } | Kind::Projections { .. }) => {
             return Err(a.missing(NUMBER_OF_FRAMES));
         }
         None => 1.0,

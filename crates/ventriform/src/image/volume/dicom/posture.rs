@@ -323,6 +323,12 @@ fn view(a: &Attributes) -> Option<Said<View>> {
         })
 }
 
+/// What says that the patient lay on something else than the back.
+pub(super) fn not_supine(a: &Attributes) -> Option<String> {
+    let position = Position::from_attributes(a);
+    (position.lying != Lying::Back).then(|| position.cited.join(", "))
+}
+
 /// The directions of rows and columns of a file without Image Orientation (Patient).
 ///
 /// # Errors

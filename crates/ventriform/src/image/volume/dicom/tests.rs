@@ -14,6 +14,7 @@ mod objects;
 mod one_scan;
 mod padding;
 mod posture;
+mod projections;
 mod refused;
 mod sorted;
 mod text;
@@ -619,10 +620,10 @@ fn what_cannot_be_is_named() {
 }
 
 #[test]
-fn projections_and_planar_pictures_are_refused() {
+fn planar_pictures_and_maps_are_refused() {
     for (image_type, shown) in [
-        ("ORIGINAL\\PRIMARY\\TOMO\\EMISSION", "projections"),
-        ("ORIGINAL\\PRIMARY\\GATED TOMO\\EMISSION", "projections"),
+        ("ORIGINAL\\PRIMARY\\TOMO\\TRANSMISSION", "transmission"),
+        ("ORIGINAL\\PRIMARY\\DYNAMIC\\EMISSION", "planar"),
         ("ORIGINAL\\PRIMARY\\STATIC\\EMISSION", "planar"),
         ("ORIGINAL\\PRIMARY\\WHOLE BODY\\EMISSION", "planar"),
         ("ORIGINAL\\PRIMARY", "only RECON TOMO"),

@@ -112,7 +112,7 @@ pub(super) fn is_one_gate(a: &Attributes, kind: Kind) -> bool {
         Kind::Nuclear { gated: false } | Kind::Enhanced => {
             matches!(a.decimals::<1>(TRIGGER_TIME), Ok(Some(_)))
         }
-        Kind::Slice | Kind::Segmentation => false,
+        Kind::Slice | Kind::Segmentation | Kind::Projections { .. } => false,
     }
 }
 

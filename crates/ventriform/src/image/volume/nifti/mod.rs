@@ -22,7 +22,9 @@ mod tests;
 
 pub use bare::is_bare;
 pub use grid::StatedGrid;
-pub use write::{LabelEntry, MaskError, StoredType, TooLong, write, write_labels, write_mask};
+pub use write::{
+    LabelEntry, MaskError, StoredType, TooLong, write, write_gates, write_labels, write_mask,
+};
 
 use self::header::Header;
 use self::place::place;

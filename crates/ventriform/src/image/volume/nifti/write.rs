@@ -210,6 +210,47 @@ pub fn write(volume: &Volume, stored: StoredType, gzip: bool) -> Result<Vec<u8>,
     Ok(if gzip { pack(&bytes) } else { bytes })
 }
 
+/// The bytes of a `.nii` file with `volumes`, of which there is at least one, all on the first's grid, as 32-bit floats
+/// along the fourth dimension, `step_ms` apart if that is known; of a `.nii.gz` file if `gzip` is set.
+///
+/// # Errors
+/// [`TooLong`] if an axis has more than 32 767 voxels, or there are more volumes.
+pub fn write_gates(
+    volumes: &[Volume],
+    step_ms: Option<f64>,
+    gzip: bool,
+) -> Result<Vec<u8>, TooLong> {
+    let Some(first) = volumes.first() else {
+        return Err(TooLong { size: 0 });
+    };
+    let mut header = header(
+        first.shape,
+        &first.frame,
+        StoredType::Float32,
+        Scaling::NONE,
+    )?;
+    let size = volumes.len();
+    if size > 1 {
+        let count = i16::try_from(size).map_err(|_| TooLong { size })?;
+        header.dim[0] = 4;
+        header.dim[4] = count.cast_unsigned();
+        if let Some(step_ms) = step_ms {
+            header.pixdim[4] = step_ms as f32;
+            header.xyzt_units = Unit::Mm as u8 | Unit::Msec as u8;
+        }
+    }
+    let mut bytes = to_bytes(&header);
+    for volume in volumes {
+        append_voxels(
+            &mut bytes,
+            &volume.voxels,
+            StoredType::Float32,
+            Scaling::NONE,
+        );
+    }
+    Ok(if gzip { pack(&bytes) } else { bytes })
+}
+
 /// Slope and intercept: value = slope * stored + inter.
 #[derive(Debug, Clone, Copy)]
 struct Scaling {

@@ -251,7 +251,7 @@ fn damage_outranks_the_kind_of_image() {
         &[(
             (0x08, 0x08),
             "CS",
-            Text("ORIGINAL\\PRIMARY\\TOMO\\EMISSION"),
+            Text("ORIGINAL\\PRIMARY\\STATIC\\EMISSION"),
         )],
     ));
     for cut in 150..whole.len() {
