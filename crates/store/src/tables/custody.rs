@@ -10,7 +10,7 @@ use ventriform_service::base::records::{
 };
 
 /// The tables that every database has.
-const TABLES: [&str; 22] = [
+const TABLES: [&str; 23] = [
     "api_keys",
     "audit",
     "audit_anchors",
@@ -23,6 +23,7 @@ const TABLES: [&str; 22] = [
     "intake_objects",
     "jobs",
     "label_index",
+    "listed_scans",
     "probe",
     "products",
     "pulled_series",
