@@ -3,9 +3,15 @@
 //! On PostgreSQL, `a` and `b` are two processes on one database; on SQLite, which one process uses, they
 //! are the same.
 
+mod search;
+
 use super::helpers::{cutoff, trusted};
 use super::postgres::{Server, reached, server};
 use futures::future::BoxFuture;
+use search::{
+    a_search_knows_what_has_changed, pages_of_a_search_have_no_gaps_while_scans_come_and_go,
+    scans_are_searched_as_a_whole,
+};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -296,6 +302,9 @@ contracts!(
     scans_are_erased_together,
     old_things_expire,
     lists_find_by_tags_and_scans,
+    scans_are_searched_as_a_whole,
+    pages_of_a_search_have_no_gaps_while_scans_come_and_go,
+    a_search_knows_what_has_changed,
     a_page_is_planned_by_the_bytes_of_its_rows,
     a_row_is_read_within_its_bytes,
     identities_are_kept_and_erased,

@@ -58,6 +58,7 @@ mod replicas;
 mod s3;
 mod s3_server;
 mod scan_erasures;
+mod scan_search;
 mod scans;
 mod scu;
 mod security;

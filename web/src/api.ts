@@ -106,7 +106,8 @@ export async function call(path: string, options: CallOptions = {}): Promise<Res
       throw new Unreachable("The service does not answer. Nothing is lost: try again when it is back.");
     }
     reachable.value = true;
-    if (answer.ok) return answer;
+    // 304 answers a validator that the request has given.
+    if (answer.ok || answer.status === 304) return answer;
     const problem = problemOf(answer.status, await answer.text());
     if (answer.status !== 401) throw new ProblemError(problem);
     if (key.value === used) {
@@ -133,17 +134,37 @@ export async function post<T>(path: string, body: unknown): Promise<T> {
   return (await answer.json()) as T;
 }
 
+/** One page of a list: its entries, where the list goes on, and what tells whether the page has changed. */
+export interface Page<T> {
+  items: T[];
+  next: string | null;
+  etag: string;
+}
+
+type ListQuery = Record<string, string | number>;
+
 /** One page of a list. */
-export async function page<T>(
-  kind: string,
-  query: Record<string, string | number> = {},
-): Promise<{ items: T[]; next: string | null }> {
-  const words = new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]));
-  const answer = await call(`/v1/${kind}?${words}`);
+export async function page<T>(kind: string, query: ListQuery = {}): Promise<Page<T>> {
+  return pageOf(kind, await call(pathOf(kind, query)));
+}
+
+/** One page of a list, or null if it is as it was when the service gave it that validator. */
+export async function changedPage<T>(kind: string, query: ListQuery, etag: string): Promise<Page<T> | null> {
+  const headers: Record<string, string> = etag ? { "if-none-match": etag } : {};
+  const answer = await call(pathOf(kind, query), { headers });
+  return answer.status === 304 ? null : pageOf(kind, answer);
+}
+
+function pathOf(kind: string, query: ListQuery): string {
+  return `/v1/${kind}?${new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]))}`;
+}
+
+async function pageOf<T>(kind: string, answer: Response): Promise<Page<T>> {
   const limit = /max-size=(\d+)/.exec(answer.headers.get("upload-limit") ?? "");
   if (limit) uploadLimit.value = Number(limit[1]);
   const body = (await answer.json()) as Record<string, unknown>;
-  return { items: body[kind] as T[], next: (body["next_cursor"] as string | undefined) ?? null };
+  const next = (body["next_cursor"] as string | undefined) ?? null;
+  return { items: body[kind] as T[], next, etag: answer.headers.get("etag") ?? "" };
 }
 
 /** What is wrong and what to do; the names that the service puts between backticks stand for themselves. */

@@ -4,19 +4,23 @@ import { at } from "./base";
 import {
   type Job,
   type Normals,
+  type Page,
   type Result,
   type Volume,
   authorization,
   call,
+  changedPage,
   get,
   page,
   reachable,
   words,
 } from "./api";
+import { listed, readList, trouble, volumes } from "./scanlist";
 import { Watched } from "./state";
+import { tellTabs } from "./tabs";
 import { isBeat, isComparison, isFit, newest } from "./words";
 
-export const volumes = new Watched<Volume[]>([]);
+export { trouble, volumes };
 export const models = new Watched<Result[]>([]);
 export const fits = new Watched<Result[]>([]);
 export const beats = new Watched<Result[]>([]);
@@ -24,19 +28,13 @@ export const comparisons = new Watched<Result[]>([]);
 export const normals = new Watched<Normals[]>([]);
 export const templates = new Watched<Result[]>([]);
 export const jobs = new Watched<Job[]>([]);
-/** Where the list of volumes goes on; null at its end. */
-export const more = new Watched<string | null>(null);
 export const loaded = new Watched<boolean>(false);
-/** Whether there are more results than were read. */
+/** Whether there are more jobs or results than were read. */
 const partial = new Watched<boolean>(false);
-export const trouble = new Watched<string>("");
-
-const PAGE = 30;
 
 /** Reads the newest of everything. */
 export async function refresh(): Promise<void> {
   const known = {
-    volumes: volumes.value,
     jobs: jobs.value,
     models: models.value,
     fits: fits.value,
@@ -46,8 +44,8 @@ export async function refresh(): Promise<void> {
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
-    const [v, m, s, b, c, t, n] = await Promise.all([
-      page<Volume>("volumes", { limit: Math.max(PAGE, Math.min(100, volumes.value.length)) }),
+    const [, m, s, b, c, t, n] = await Promise.all([
+      readList(),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
       page<Result>("beats", { limit: 100 }),
@@ -55,16 +53,14 @@ export async function refresh(): Promise<void> {
       page<Result>("templates", { limit: 100 }),
       page<Normals>("normals", { limit: 100 }),
     ]);
-    volumes.value = renewed(known.volumes, volumes.value, v.items);
-    more.value = v.next;
-    jobs.value = renewed(known.jobs, jobs.value, j.items).map(latest(jobs.value));
-    models.value = renewed(known.models, models.value, m.items);
-    fits.value = renewed(known.fits, fits.value, s.items);
-    beats.value = renewed(known.beats, beats.value, b.items);
-    comparisons.value = renewed(known.comparisons, comparisons.value, c.items);
+    jobs.value = renewed(known.jobs, jobs.value, j).map(latest(jobs.value));
+    models.value = renewed(known.models, models.value, m);
+    fits.value = renewed(known.fits, fits.value, s);
+    beats.value = renewed(known.beats, beats.value, b);
+    comparisons.value = renewed(known.comparisons, comparisons.value, c);
     templates.value = t.items;
     normals.value = n.items;
-    partial.value = Boolean(m.next || s.next || b.next || c.next);
+    partial.value = Boolean(j.next || m.next || s.next || b.next || c.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -73,12 +69,17 @@ export async function refresh(): Promise<void> {
   watchActive();
 }
 
-/** The list `read`, with what this page added and without what it erased while the answer was on its way. */
-function renewed<T extends { id: string }>(before: T[], now: T[], read: T[]): T[] {
+/**
+ * The list `now` with the newest as they were read: with what this page added and without what it erased while the
+ * answer was on its way, and with what is older than the page that was read.
+ */
+function renewed<T extends { id: string; created_at: string }>(before: T[], now: T[], { items, next }: Page<T>): T[] {
   const ids = (list: T[]) => new Set(list.map(item => item.id));
-  const [old, kept, answered] = [ids(before), ids(now), ids(read)];
-  const added = now.filter(item => !old.has(item.id) && !answered.has(item.id));
-  return [...added, ...read.filter(item => kept.has(item.id) || !old.has(item.id))];
+  const [old, kept, answered] = [ids(before), ids(now), ids(items)];
+  const last = items.at(-1);
+  const isOlder = (item: T) => next !== null && last !== undefined && newest(last, item) <= 0;
+  const others = now.filter(item => !answered.has(item.id) && (!old.has(item.id) || isOlder(item)));
+  return [...others, ...items.filter(item => kept.has(item.id) || !old.has(item.id))].sort(newest);
 }
 
 /** The newer state of a job: its events may have overtaken the list. */
@@ -86,27 +87,20 @@ function latest(now: Job[]): (job: Job) => Job {
   return job => now.find(other => other.id === job.id && other.revision > job.revision) ?? job;
 }
 
-export async function loadMore(limit = PAGE): Promise<void> {
-  if (!more.value) return;
-  try {
-    const next = await page<Volume>("volumes", { limit, cursor: more.value });
-    const known = new Set(volumes.value.map(volume => volume.id));
-    volumes.value = [...volumes.value, ...next.items.filter(volume => !known.has(volume.id))];
-    more.value = next.next;
-  } catch (error) {
-    trouble.value = words(error);
-  }
-}
-
 /** Reads one scan with everything made of it, also what is too old for the first pages. */
 export async function loadScan(id: string): Promise<Volume> {
   const volume = await get<Volume>(`/v1/volumes/${id}`);
   if (!volumes.value.some(other => other.id === id)) volumes.value = [...volumes.value, volume];
+  await loadMade(id);
+  return volume;
+}
+
+/** Reads the jobs on a scan, and what they made. */
+async function loadMade(id: string): Promise<void> {
   const own = await page<Job>("jobs", { volume: id, limit: 100 });
   for (const job of own.items.reverse()) put(job);
   const missing = own.items.flatMap(job => (job.state === "succeeded" ? [madeBy(job)] : []));
   await Promise.all([...new Set(missing)].map(result => (result && !find(result) ? loadResult(result) : null)));
-  return volume;
 }
 
 const complete = new Set<string>();
@@ -115,28 +109,8 @@ const complete = new Set<string>();
 export function loadResultsOf(id: string): void {
   if (!partial.value || complete.has(id)) return;
   complete.add(id);
-  void loadScan(id).catch(() => complete.delete(id));
+  void loadMade(id).catch(() => complete.delete(id));
 }
-
-/** Reads the results of all scans that were read, at most `MOST` of each kind. */
-export async function loadAllResults(): Promise<void> {
-  if (!partial.value) return;
-  partial.value = false;
-  for (const [kind, list] of KINDS) {
-    let cursor: string | null = null;
-    do {
-      const next: { items: Result[]; next: string | null } = await page<Result>(kind, {
-        limit: 100,
-        ...(cursor ? { cursor } : {}),
-      });
-      const known = new Set(list.value.map(result => result.id));
-      list.value = [...list.value, ...next.items.filter(result => !known.has(result.id))];
-      cursor = next.next;
-    } while (cursor && list.value.length < MOST);
-  }
-}
-
-const MOST = 2000;
 
 /** The results of scans: their collection, and what of it was read. */
 const KINDS = [
@@ -240,11 +214,35 @@ async function refreshJobs(): Promise<void> {
   }
   if (!reachable.value || !loaded.value) return refresh();
   try {
-    for (const job of (await page<Job>("jobs", { limit: 100 })).items.reverse()) put(job);
+    await readJobs();
   } catch (error) {
     trouble.value = words(error);
   }
   watchActive();
+}
+
+async function readJobs(): Promise<void> {
+  const before = jobs.value;
+  const read = await page<Job>("jobs", { limit: 100 });
+  for (const job of [...read.items].reverse()) put(job);
+  jobs.value = renewed(before, jobs.value, { ...read, items: read.items.map(latest(jobs.value)) });
+}
+
+const validators = new Map<string, string>();
+
+/** Reads the newest jobs again, and with `results` what was made, where it has changed. */
+export async function refreshMade(results: boolean): Promise<void> {
+  if (!loaded.value) return;
+  await readJobs();
+  watchActive();
+  if (!results) return;
+  for (const [kind, list] of KINDS) {
+    const before = list.value;
+    const read = await changedPage<Result>(kind, { limit: 100 }, validators.get(kind) ?? "");
+    if (!read) continue;
+    validators.set(kind, read.etag);
+    list.value = renewed(before, list.value, read);
+  }
 }
 
 /** Reads the events of a job until it ends. `EventSource` cannot send a key, so the stream is read by fetch. */
@@ -283,21 +281,26 @@ export async function cancel(job: Job): Promise<void> {
   const now = await get<Job>(job.links.self).catch(() => null);
   if (now) put(now);
   watchActive();
+  tellTabs();
 }
 
 export async function forget(job: Job): Promise<void> {
   await call(`${job.links.self}${job.state === "cancelled" ? "?erase=true" : ""}`, { method: "DELETE" });
   jobs.value = jobs.value.filter(other => other.id !== job.id);
+  tellTabs();
 }
 
 export async function eraseResult(id: string): Promise<void> {
   const [kind, list] = kindOf(id);
   await call(`/v1/${kind}/${id}`, { method: "DELETE" });
   list.value = list.value.filter(result => result.id !== id);
+  tellTabs();
 }
 
 export async function eraseVolume(id: string): Promise<void> {
   await call(`/v1/volumes/${id}?cascade=true`, { method: "DELETE" });
   volumes.value = volumes.value.filter(volume => volume.id !== id);
-  await refresh();
+  listed.value = listed.value.filter(volume => volume.id !== id);
+  tellTabs();
+  await refreshMade(true);
 }

@@ -11,6 +11,13 @@ export function rememberFileName(volume: Volume, name: string): void {
   sentAs.set(volume.id, name);
 }
 
+/** Whether each word of `search` is part of the name of the file that this tab has sent as the scan. */
+export function wasSentAs(volume: Volume, search: string): boolean {
+  const name = sentAs.get(volume.id)?.toLowerCase();
+  const words = search.toLowerCase().split(/\s+/).filter(Boolean);
+  return name !== undefined && words.length > 0 && words.every(word => name.includes(word));
+}
+
 /** What the service calls a scan: what may be stored with what is made of it. */
 export function storedNameOf(volume: Volume): string {
   return volume.external_id || volume.labels["name"] || shortId(volume);

@@ -2,6 +2,7 @@
 
 import { type Job, type Kind, type ParameterValue, type Volume, post } from "./api";
 import { put, watchActive } from "./library";
+import { tellTabs } from "./tabs";
 import { storedNameOf } from "./words";
 
 const filed = new Set<string>();
@@ -13,6 +14,7 @@ function follow(job: Job): Job {
   filed.add(job.id);
   put(job);
   watchActive();
+  tellTabs();
   return job;
 }
 

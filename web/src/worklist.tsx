@@ -13,14 +13,12 @@ import {
   fits,
   isActive,
   jobs,
-  loadAllResults,
-  loadMore,
   loadResultsOf,
   loaded,
   models,
-  more,
   put,
   refresh,
+  refreshMade,
   trouble,
   volumes,
 } from "./library";
@@ -28,6 +26,23 @@ import { offeredPair, pick, picked, statedPair, statedRole, studyKey } from "./p
 import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
 import { open, route } from "./route";
+import {
+  type Asked,
+  type Order,
+  type Show,
+  WHOLE,
+  addStored,
+  arrived,
+  ask,
+  asked,
+  isWhole,
+  listed,
+  loadMore,
+  more,
+  readList,
+  receiving,
+  watchList,
+} from "./scanlist";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
 import {
@@ -47,18 +62,18 @@ import {
   shape,
   study,
   titleOf,
+  wasSentAs,
 } from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
-type Show = "all" | "fits" | "beats" | "models" | "comparisons" | "nothing" | "failed";
-type Order = "newest" | "name" | "largest";
 
 /** The kind of fit for a scan: its gates are fitted together. */
 const fitOf = (volume: Volume) => (isGated(volume) ? "beat" : "segmentation");
 
 const THEN = "ventriform.then";
-const SHOWN = 30;
+/** Pause after the last letter before a search is asked for, ms. */
+const TYPING = 250;
 
 export function WorkList() {
   const [then, setThen] = useState<Then>(() => (localStorage.getItem(THEN) as Then | null) ?? "fit");
@@ -67,7 +82,7 @@ export function WorkList() {
     localStorage.setItem(THEN, then);
     onStored(
       volume => {
-        volumes.value = [volume, ...volumes.value.filter(other => other.id !== volume.id)];
+        addStored(volume);
         if (then === "nothing" || isLabelMap(volume)) return;
         const alone =
           uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
@@ -241,7 +256,8 @@ interface Row {
 }
 
 function Scans() {
-  const all = useWatched(volumes);
+  const all = useWatched(listed);
+  const known = useWatched(volumes);
   const allFits = useWatched(fits);
   const allModels = useWatched(models);
   const allBeats = useWatched(beats);
@@ -250,13 +266,14 @@ function Scans() {
   const next = useWatched(more);
   const isLoaded = useWatched(loaded);
   const problem = useWatched(trouble);
-  const [search, setSearch] = useState("");
-  const [show, setShow] = useState<Show>("all");
-  const [order, setOrder] = useState<Order>("newest");
-  const [at, setAt] = useState(0);
+  const of = useWatched(asked);
+  useEffect(() => watchList(refreshMade), []);
   const rows = useMemo((): Row[] => {
     const results = [...allBeats, ...allFits, ...allModels].sort(newest);
-    return all.map(volume => ({
+    const here = new Set(all.map(volume => volume.id));
+    // The service does not know the names of files that this tab has sent.
+    const sent = known.filter(volume => !here.has(volume.id) && wasSentAs(volume, of.search));
+    return [...sent, ...all].map(volume => ({
       volume,
       results: results.filter(result => result.volume === volume.id),
       open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded" && job.kind !== "normals"),
@@ -264,16 +281,8 @@ function Scans() {
         .filter(made => made.volume === volume.id || made.parameters["rest"] === volume.id)
         .sort(newest),
     }));
-  }, [all, allFits, allModels, allBeats, allJobs, allComparisons]);
-  // A search looks at everything stored, so the rest of the list is read first.
-  useEffect(() => {
-    if (!search && order === "newest" && show === "all") return;
-    void loadAllResults().catch(error => (trouble.value = words(error)));
-    if (next && all.length < 2000) void loadMore(100);
-  }, [search, order, show, next, all.length]);
-  const shown = byStudy(rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]));
-  useEffect(() => setAt(0), [search, show, order]);
-  const part = shown.slice(at, at + SHOWN);
+  }, [all, known, of.search, allFits, allModels, allBeats, allJobs, allComparisons]);
+  const shown = byStudy(rows);
   if (!isLoaded)
     return problem ? (
       <p class="error pad">
@@ -285,9 +294,10 @@ function Scans() {
     ) : (
       <p class="quiet pad">Reading the list …</p>
     );
-  if (all.length === 0) {
+  if (all.length === 0 && isWhole(of)) {
     return (
       <section class="welcome">
+        <Receiving />
         <h2>From scan to ventricle</h2>
         <ol>
           <li>
@@ -316,116 +326,166 @@ function Scans() {
   }
   return (
     <section aria-label="Stored scans">
-      <div class="tools">
-        <input
-          type="search"
-          aria-label="Search name, id or label"
-          placeholder="Search name, id or label"
-          value={search}
-          onInput={event => setSearch(event.currentTarget.value)}
-        />
-        <label class="inline">
-          Show
-          <select value={show} onChange={event => setShow(event.currentTarget.value as Show)}>
-            <option value="all">all scans</option>
-            <option value="fits">with a fit</option>
-            <option value="beats">with a beat</option>
-            <option value="models">with a model</option>
-            <option value="comparisons">with rest and stress compared</option>
-            <option value="nothing">without a result</option>
-            <option value="failed">with a failed job</option>
-          </select>
-        </label>
-        <label class="inline">
-          Sort
-          <select value={order} onChange={event => setOrder(event.currentTarget.value as Order)}>
-            <option value="newest">newest first</option>
-            <option value="name">by name</option>
-            <option value="largest">largest first</option>
-          </select>
-        </label>
-        <span class="quiet" role="status">
-          {shown.length}
-          {next ? "+" : ""} {shown.length === 1 ? "scan" : "scans"}
-        </span>
-      </div>
+      <Tools count={`${shown.length}${next ? "+" : ""} ${shown.length === 1 ? "scan" : "scans"}`} />
       {problem && (
         <p class="error" role="alert">
           {problem}
         </p>
       )}
+      <Arrived />
+      <Receiving />
       <ul class="scans">
-        {groupsOf(part).map(group => (
+        {groupsOf(shown).map(group => (
           <StudyRow key={group[0]!.volume.id} group={group} />
         ))}
       </ul>
       {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
-      {(at > 0 || shown.length > at + SHOWN || next) && (
-        <nav class="paging" aria-label="Pages of the list">
-          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>
-            Previous
-          </button>
-          <span>
-            {at + 1} to {at + part.length}
-          </span>
-          <button
-            type="button"
-            disabled={shown.length <= at + SHOWN && !next}
-            onClick={() => {
-              const go = () => setAt(at + SHOWN);
-              if (shown.length <= at + SHOWN) void loadMore().then(go);
-              else go();
-            }}>
-            Next
-          </button>
-        </nav>
-      )}
+      {next && <More />}
     </section>
   );
 }
 
-function matches({ volume, results, compared }: Row, search: string): boolean {
-  const text = search.trim().toLowerCase();
-  if (!text) return true;
-  const labels = Object.entries(volume.labels).map(([name, value]) => `${name}:${value}`);
-  const all = [
-    nameOf(volume),
-    volume.id,
-    volume.external_id ?? "",
-    volume.format,
-    study(volume),
-    ...labels,
-    ...acquisition(volume),
-    statedRole(volume) ?? "",
-    ...[...results, ...compared].map(result => result.id),
-  ];
-  return all.some(word => word.toLowerCase().includes(text));
+const REFINED: (keyof Asked)[] = ["role", "modality", "from", "to"];
+
+/** What of the list is asked for: it is searched, filtered and ordered by the service. */
+function Tools({ count }: { count: string }) {
+  const of = useWatched(asked);
+  const [search, setSearch] = useState(of.search);
+  const typing = useRef<ReturnType<typeof setTimeout>>();
+  const change = (text: string) => {
+    setSearch(text);
+    clearTimeout(typing.current);
+    typing.current = setTimeout(() => ask({ search: text }), TYPING);
+  };
+  useEffect(() => () => clearTimeout(typing.current), []);
+  const refined = REFINED.filter(name => of[name] !== WHOLE[name]).length;
+  return (
+    <div class="tools">
+      <input
+        type="search"
+        aria-label="Search patient, name, id or label"
+        placeholder="Search patient, name, id or label"
+        maxLength={128}
+        value={search}
+        onInput={event => change(event.currentTarget.value)}
+      />
+      <label class="inline">
+        Show
+        <select value={of.show} onChange={event => ask({ show: event.currentTarget.value as Show })}>
+          <option value="all">all scans</option>
+          <option value="segmentation">with a fit</option>
+          <option value="beat">with a beat</option>
+          <option value="model">with a model</option>
+          <option value="comparison">with rest and stress compared</option>
+          <option value="nothing">without a result</option>
+          <option value="unfinished">with a job under way</option>
+          <option value="failed">with a failed job</option>
+        </select>
+      </label>
+      <label class="inline">
+        Sort
+        <select value={of.order} onChange={event => ask({ order: event.currentTarget.value as Order })}>
+          <option value="newest">newest first</option>
+          <option value="study_date">latest study first</option>
+          <option value="patient">by patient</option>
+          <option value="name">by name</option>
+          <option value="largest">largest first</option>
+        </select>
+      </label>
+      <details class="filters">
+        <summary>Filters{refined > 0 && ` (${refined})`}</summary>
+        <label class="inline">
+          Made at
+          <select value={of.role} onChange={event => ask({ role: event.currentTarget.value as Asked["role"] })}>
+            <option value="">rest or stress</option>
+            <option value="rest">rest</option>
+            <option value="stress">stress</option>
+          </select>
+        </label>
+        <label class="inline">
+          Modality
+          <select value={of.modality} onChange={event => ask({ modality: event.currentTarget.value })}>
+            <option value="">any</option>
+            <option value="NM">NM</option>
+            <option value="PT">PT</option>
+            <option value="CT">CT</option>
+            <option value="MR">MR</option>
+          </select>
+        </label>
+        <label class="inline">
+          Studies from
+          <input type="date" value={of.from} onChange={event => ask({ from: event.currentTarget.value })} />
+        </label>
+        <label class="inline">
+          to
+          <input type="date" value={of.to} onChange={event => ask({ to: event.currentTarget.value })} />
+        </label>
+        {refined > 0 && (
+          <button type="button" class="plain" onClick={() => ask({ role: "", modality: "", from: "", to: "" })}>
+            No filter
+          </button>
+        )}
+      </details>
+      <span class="quiet" role="status">
+        {count}
+      </span>
+    </div>
+  );
 }
 
-function passes(row: Row, show: Show): boolean {
-  switch (show) {
-    case "fits":
-      return row.results.some(result => isFit(result.id));
-    case "beats":
-      return row.results.some(result => isBeat(result.id));
-    case "models":
-      return row.results.some(result => !isFit(result.id) && !isBeat(result.id));
-    case "comparisons":
-      return row.compared.length > 0;
-    case "nothing":
-      return row.results.length === 0 && row.compared.length === 0;
-    case "failed":
-      return row.open.some(job => job.state === "failed");
-    case "all":
-      return true;
-  }
+/** What has come since the list was read: rows do not move under the hand of who reads them. */
+function Arrived() {
+  const fresh = useWatched(arrived).length;
+  const what = `${fresh} new ${fresh === 1 ? "scan" : "scans"}`;
+  const show = () => void readList().catch(error => (trouble.value = words(error)));
+  return (
+    <div class="arrived" role="status">
+      {fresh > 0 && (
+        <button type="button" onClick={show}>
+          Show {what}
+        </button>
+      )}
+    </div>
+  );
 }
 
-const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
-  newest: (a, b) => newest(a.volume, b.volume),
-  name: (a, b) => nameOf(a.volume).localeCompare(nameOf(b.volume), undefined, { numeric: true }),
-  largest: (a, b) => b.volume.bytes - a.volume.bytes,
-};
+/** What other systems are sending. */
+function Receiving() {
+  const now = useWatched(receiving);
+  if (!now?.series) return null;
+  return (
+    <p class="quiet" role="status">
+      {now.series} series {now.series === 1 ? "is" : "are"} being received: {now.objects}{" "}
+      {now.objects === 1 ? "object" : "objects"}, {bytes(now.bytes)} so far.
+    </p>
+  );
+}
+
+/** Goes on with the list; the first of the new rows is focused. */
+function More() {
+  const [reading, setReading] = useState(false);
+  const go = () => {
+    const before = new Set([...document.querySelectorAll(".scan a.name")].map(link => link.getAttribute("href")));
+    setReading(true);
+    loadMore()
+      .then(
+        () =>
+          requestAnimationFrame(() => {
+            const links = [...document.querySelectorAll<HTMLAnchorElement>(".scan a.name")];
+            links.find(link => !before.has(link.getAttribute("href")))?.focus();
+          }),
+        error => (trouble.value = words(error)),
+      )
+      .finally(() => setReading(false));
+  };
+  return (
+    <div class="paging">
+      <button type="button" disabled={reading} onClick={go}>
+        Load more
+      </button>
+    </div>
+  );
+}
 
 /** Scans of one study follow the first of them. */
 function byStudy(rows: Row[]): Row[] {

@@ -1045,19 +1045,20 @@ async function main() {
     const ascending = Array.from({ length: count }, (_, n) => n + 1);
     await awaited("scan 1", 30);
     assert.deepEqual(await shown(), scans(...ascending.slice(0, 30)));
-    await page.getByRole("button", { name: "Next", exact: true }).click();
-    await awaited("scan 31", 3);
-    assert.match(await page.textContent(".paging"), /31 to 33/);
-    assert.ok(await page.getByRole("button", { name: "Next", exact: true }).isDisabled());
+    const loadMore = page.getByRole("button", { name: "Load more" });
+    await loadMore.click();
+    await awaited("scan 1", 33);
+    assert.deepEqual(await shown(), scans(...ascending));
+    assert.equal(await loadMore.count(), 0);
+    // The first of the new rows has the focus.
+    await page.waitForFunction(() => document.activeElement?.textContent === "scan 31");
     await look(page, "pages-1280");
-    await page.getByRole("button", { name: "Previous", exact: true }).click();
-    await awaited("scan 1", 30);
     await page.getByLabel("Sort").selectOption("largest");
     await awaited("scan 33", 30);
     assert.deepEqual(await shown(), scans(...ascending.toReversed().slice(0, 30)));
     // By name, numbers in the order of their values; a new order starts at its first page.
-    await page.getByRole("button", { name: "Next", exact: true }).click();
-    await awaited("scan 3", 3);
+    await loadMore.click();
+    await awaited("scan 33", 33);
     await page.getByLabel("Sort").selectOption("name");
     await awaited("scan 1", 30);
     assert.deepEqual(await shown(), scans(...ascending.slice(0, 30)));
@@ -1065,6 +1066,110 @@ async function main() {
     await awaited("scan 32", 1);
     assert.deepEqual(faults, []);
     await close();
+  });
+
+  await check("a search finds what is on no page, with its filters, and says when nothing does", async () => {
+    const own = await service();
+    const store = async (n, name) => {
+      const sent = new FormData();
+      sent.append("volume", new Blob([small(n)]), "small.nii");
+      const labels = new URLSearchParams({ labels: `name:${name}` });
+      const answer = await fetch(`${own.address}/v1/volumes?${labels}`, { method: "POST", body: sent });
+      assert.equal(answer.status, 201, await answer.text());
+      return (await answer.json()).id;
+    };
+    const oldest = await store(1, "Found Alone");
+    for (let n = 2; n <= 45; n++) await store(n, `other ${n}`);
+    const stated = await fetch(`${own.address}/v1/volumes/${oldest}/identity`, {
+      method: "PUT",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify({
+        patient_name: "Hidden^Hanna",
+        patient_id: "H-1",
+        study_date: "20260131",
+        study_uid: "1.2.3.4",
+      }),
+    });
+    assert.ok(stated.ok, await stated.text());
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForFunction(() => document.querySelectorAll(".scan").length === 30);
+    assert.match(await page.textContent(".tools"), /30\+ scans/);
+    const alone = async () => {
+      await page.waitForFunction(() => document.querySelectorAll(".scan").length === 1);
+      assert.deepEqual(await page.locator(".scan .name").allTextContents(), ["Found Alone"]);
+    };
+    const search = page.getByLabel("Search patient, name, id or label");
+    for (const words of ["hanna hidden", "FOUND", "2026-01-31", oldest.slice(4, 14)]) {
+      await search.fill(words);
+      await alone();
+      await search.fill("");
+      await page.waitForFunction(() => document.querySelectorAll(".scan").length === 30);
+    }
+    await page.getByText("Filters").click();
+    await page.getByLabel("Studies from").fill("2026-01-31");
+    await alone();
+    await look(page, "filters-1280");
+    await page.setViewportSize({ width: 400, height: 850 });
+    await look(page, "filters-400");
+    await page.getByLabel("Made at").selectOption("rest");
+    await page.waitForFunction(() => /Nothing matches/.test(document.body.textContent));
+    await page.getByRole("button", { name: "No filter" }).click();
+    await page.waitForFunction(() => document.querySelectorAll(".scan").length === 30);
+    await page.getByLabel("Show").selectOption("segmentation");
+    await page.waitForFunction(() => /Nothing matches/.test(document.body.textContent));
+    assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("two tabs agree on what is stored, and rows that arrive do not move the others", async () => {
+    const own = await service();
+    const store = async n => {
+      const sent = new FormData();
+      sent.append("volume", new Blob([small(n)]), "small.nii");
+      const answer = await fetch(`${own.address}/v1/volumes?labels=name:scan%20${n}`, { method: "POST", body: sent });
+      assert.equal(answer.status, 201, await answer.text());
+    };
+    await store(1);
+    const one = await tab(browser, own.address);
+    // A browser of another person, which nothing tells.
+    const two = await tab(browser, own.address);
+    // Another tab of the first browser.
+    const three = await one.page.context().newPage();
+    await three.goto(own.address);
+    const names = page => page.locator(".scan .name").allTextContents();
+    const until = (page, wanted) =>
+      page.waitForFunction(
+        wanted => [...document.querySelectorAll(".scan .name")].map(name => name.textContent).join() === wanted,
+        wanted,
+      );
+    for (const page of [one.page, two.page, three]) await until(page, "scan 1");
+    // Others send two scans: the list says so, and shows them when asked.
+    await store(2);
+    await store(3);
+    for (const page of [one.page, two.page]) {
+      await page.getByRole("button", { name: "Show 2 new scans" }).waitFor();
+      assert.deepEqual(await names(page), ["scan 1"]);
+    }
+    await look(one.page, "arrived-1280");
+    await one.page.getByRole("button", { name: "Show 2 new scans" }).click();
+    await two.page.getByRole("button", { name: "Show 2 new scans" }).click();
+    for (const page of [one.page, two.page]) await until(page, "scan 3,scan 2,scan 1");
+    // What one erases, the others lose.
+    await one.page.getByRole("button", { name: "Erase scan 2" }).click();
+    await one.page.getByRole("button", { name: "Erase", exact: true }).click();
+    for (const page of [one.page, two.page]) await until(page, "scan 3,scan 1");
+    // A result that somebody else made is shown.
+    const [volume] = (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes;
+    await fetch(`${own.address}/v1/jobs`, {
+      method: "POST",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify({ kind: "model", volume: volume.id, parameters: { points: 50 } }),
+    });
+    for (const page of [one.page, two.page]) await page.waitForSelector(".scan .result, .scan .job");
+    assert.deepEqual([...one.faults, ...two.faults], []);
+    await three.close();
+    await one.close();
+    await two.close();
   });
 
   await check("a list that is slow to come keeps what happened meanwhile", async () => {

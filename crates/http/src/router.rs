@@ -81,7 +81,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 42] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 43] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -125,6 +125,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(stow::store_study_instances).layer(upload()),
         routes!(intake_status::list_received),
         routes!(intake_status::forget_received),
+        routes!(intake_status::show_receiving),
         routes!(workitems::create_workitem, workitems::search_workitems)
             .layer(json(settings.json_limit)),
         routes!(

@@ -19,6 +19,9 @@ use ventriform_service::callers::AuditEvent;
 /// Tables whose rows are never deleted: their greatest number is how many there were.
 const NEVER_DELETED: &[&str] = &["api_keys", "erasures"];
 
+/// Tables that repeat what others hold, and are made anew of these.
+const KEPT_BY_TRIGGERS: &[&str] = &["label_index", "listed_scans"];
+
 /// Rows of a table without row numbers that are copied at a time.
 const BATCH_ROWS: i64 = 500;
 
@@ -225,10 +228,16 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
     ] {
         run(to, format!("INSERT OR IGNORE INTO main.label_index (tenant, kind, name, value, sequence) {from}")).await?;
     }
-    salvaged.retain(|found: &Salvaged| found.table != "label_index");
     for statement in RECOUNT {
         run(to, statement).await?;
     }
+    run(to, "DELETE FROM main.listed_scans").await?;
+    run(
+        to,
+        "INSERT INTO main.listed_scans SELECT * FROM main.listed_scans_now",
+    )
+    .await?;
+    salvaged.retain(|found: &Salvaged| !KEPT_BY_TRIGGERS.contains(&found.table.as_str()));
     for (_, sql) in &triggers {
         run(to, sql.clone()).await?;
     }

@@ -1,5 +1,5 @@
 //! `/v1/intake`: what other systems have sent, and what became of it, for callers with the scope
-//! `admin`.
+//! `admin`; and `/v1/receiving`: how much is being received, for everybody.
 
 use crate::app::App;
 use crate::edge::caller::Caller;
@@ -145,6 +145,37 @@ pub async fn list_received(
     Ok(Json(ReceivedList {
         intake: page.items.into_iter().map(ReceivedBody::from).collect(),
         next_cursor,
+    }))
+}
+
+/// What is being received from other systems.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Receiving)]
+pub struct ReceivingBody {
+    /// Number of series, and of objects that are volumes of their own, of which objects still arrive or are being read.
+    series: u64,
+    /// Number of their objects that have arrived.
+    objects: u64,
+    /// Size of these, bytes.
+    bytes: u64,
+}
+
+/// Show what is being received
+///
+/// How much other systems are sending by C-STORE or STOW-RS that is no volume yet. It names neither patients nor
+/// senders.
+#[utoipa::path(get, path = "/v1/receiving", tag = "dicomweb", operation_id = "show_receiving",
+    responses((status = 200, description = "How much it is", body = ReceivingBody), ListProblems))]
+pub async fn show_receiving(
+    State(app): State<App>,
+    caller: Caller,
+    _: NoQuery,
+) -> Answer<Json<ReceivingBody>> {
+    let receiving = app.service.receiving(&caller.tenant).await?;
+    Ok(Json(ReceivingBody {
+        series: receiving.groups,
+        objects: receiving.objects,
+        bytes: receiving.bytes,
     }))
 }
 

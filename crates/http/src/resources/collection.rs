@@ -11,15 +11,15 @@ use crate::openapi::{
     UnchangedAnswer,
 };
 use crate::resources::erasures::{self, CascadeQuery, ReceiptBody};
+use crate::resources::scan_search::ScanListQuery;
 use crate::resources::scans::{self, ScanQuery};
 use crate::resources::tags::TagQuery;
 use crate::wire::pagination::{PageQuery, next_cursor};
-use crate::wire::problem::Answer;
 use crate::wire::problem::not_found::missing;
+use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::{NoQuery, QueryReader};
 use crate::wire::request::PathSegments;
-use crate::wire::validators::ValidatedJson;
-use axum::Json;
+use crate::wire::validators::{ValidatedJson, json};
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::routing::{delete, get};
@@ -70,7 +70,7 @@ pub trait Collection: 'static {
         id: &str,
     ) -> impl Future<Output = Result<Option<Owned<Self::Row>>, ServiceError>> + Send;
 
-    /// A page of the tenant's rows, newest first, likewise.
+    /// A page of the tenant's rows, newest first unless the filter says otherwise, likewise.
     fn rows(
         service: &Service,
         tenant: &Tenant,
@@ -93,13 +93,21 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
         format!("List {plural}"),
     )
     .parameters::<PageQuery>()
+    .parameters::<CachedHeaders>()
     .json::<ListBody<C>>("A page, newest first")
+    .answers::<UnchangedAnswer>()
     .answers::<ListProblems>();
     if C::CARRIES_TAGS {
         listing = listing.parameters::<TagQuery>();
     }
     if C::SEARCHED_BY_SCAN {
         listing = listing.parameters::<ScanQuery>();
+    }
+    if C::RESOURCE_KIND == Resource::Volume {
+        listing = listing.parameters::<ScanListQuery>().description(
+            "All that are stored are searched, filtered and ordered. The page's validator in `ETag` \
+             tells whether anything on it has changed.",
+        );
     }
     let lookup = operation(
         HttpMethod::Get,
@@ -158,8 +166,9 @@ const UPLOAD_LIMIT: HeaderName = HeaderName::from_static("upload-limit");
 async fn list<C: Collection>(
     State(app): State<App>,
     caller: Caller,
+    headers: HeaderMap,
     mut query: QueryReader,
-) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
+) -> Answer {
     let mut filter = ItemFilter::default();
     if C::CARRIES_TAGS {
         filter.tags = query.take::<TagQuery>()?.filter(&app)?;
@@ -167,21 +176,27 @@ async fn list<C: Collection>(
     if C::SEARCHED_BY_SCAN {
         filter.scan = query.take::<ScanQuery>()?.into();
     }
+    if C::RESOURCE_KIND == Resource::Volume {
+        filter.search = query.take::<ScanListQuery>()?.search(&caller)?;
+    }
     let page = query.all::<PageQuery>()?.charged().await?;
-    let page = C::rows(&app.service, &caller.tenant, &filter, page).await?;
+    let page = C::rows(&app.service, &caller.tenant, &filter, page).await;
+    let page = page.map_err(|refused| Problem::from(refused).of_search())?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
         .into_iter()
         .map(|row| C::body(&app, caller.scope, row))
         .collect::<Result<_, _>>()?;
-    let mut headers = HeaderMap::new();
+    let body: ListBody<C> = ListBody { items, next_cursor };
+    let mut answer = json(&headers, &body)?;
     if C::RESOURCE_KIND == Resource::Volume {
         let limit = HeaderValue::from(app.service.settings().body_limit.0);
         let limit = [b"max-size=", limit.as_bytes()].concat();
-        headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
+        let limit = HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit));
+        answer.headers_mut().extend(limit);
     }
-    Ok((headers, Json(ListBody { items, next_cursor })))
+    Ok(answer)
 }
 
 async fn show<C: Collection>(

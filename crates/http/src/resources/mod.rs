@@ -13,6 +13,7 @@ pub(crate) mod normals;
 pub(crate) mod products;
 pub(crate) mod readers;
 pub(crate) mod scan_erasures;
+pub(crate) mod scan_search;
 pub(crate) mod scans;
 pub(crate) mod segmentations;
 pub(crate) mod tags;

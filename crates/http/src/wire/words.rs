@@ -10,7 +10,9 @@ use utoipa::{PartialSchema, ToSchema};
 use ventriform::heart::model::Organ;
 use ventriform::mesh::files::{MeshFrame, MeshUnit};
 use ventriform::results::export::Part;
-use ventriform_service::base::records::{JobState, Priority};
+use ventriform_service::base::records::{
+    JobOnScan, JobState, MadeOfScan, Priority, RestOrStress, ScanOrder,
+};
 use ventriform_service::callers::Scope;
 use ventriform_service::network::hooks::HookEvent;
 use ventriform_service::network::intake::GroupState;
@@ -53,12 +55,16 @@ macro_rules! named {
 named! {
     HookEvent, HookEventName, "HookEvent", Some("What is told of a job.");
     GroupState, ReceivedState, "ReceivedState", Some("What became of received objects.");
+    JobOnScan, JobOnScanName, "JobOnScan", None;
     JobState, JobStateName, "JobState", Some("The state of a job.");
+    MadeOfScan, MadeOfScanName, "MadeOfScan", None;
     MeshFrame, MeshFrameName, "MeshFrame", None;
     MeshUnit, MeshUnitName, "MeshUnit", None;
     Organ, OrganName, "Organ", None;
     Part, PartName, "Part", None;
     Priority, PriorityName, "Priority", Some("How urgent a job is.");
+    RestOrStress, RestOrStressName, "RestOrStress", None;
+    ScanOrder, ScanOrderName, "ScanOrder", None;
     Scope, ScopeName, "Scope", Some("What a key allows.");
 }
 

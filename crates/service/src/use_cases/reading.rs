@@ -4,11 +4,11 @@
 //! [`read_row`] says, for a page by the bytes that the database plans for it. `None` is a row that the tenant does not
 //! have; [`Service::erased_at`] tells whether it had it.
 
-use crate::base::error::ServiceResult;
+use crate::base::error::{ServiceResult, invalid_field};
 use crate::base::memory::{charge_plan, read_row};
 use crate::base::records::{
-    ItemFilter, Job, JobFilter, JobState, ListPage, ListRequest, Owned, Product, Receipt, Resource,
-    ScanIdentity, StoreResult, StoredVolume, Tenant, Timestamp,
+    ItemFilter, Job, JobFilter, JobState, ListPage, ListRequest, Owned, PagePlan, Product, Receipt,
+    Receiving, Resource, ScanIdentity, ScanSearch, StoreResult, StoredVolume, Tenant, Timestamp,
 };
 use crate::jobs::QueuePosition;
 use crate::network::archive::{ObjectDelivery, Pull};
@@ -60,7 +60,10 @@ impl Service {
         self.queue.table().job(id).await
     }
 
-    /// A page of the tenant's volumes, newest first.
+    /// A page of the tenant's volumes, in the order of the search.
+    ///
+    /// # Errors
+    /// `invalid-field` at `cursor` if the row at which the page before ended is no longer there; if the database fails.
     pub async fn volumes(
         &self,
         tenant: &Tenant,
@@ -68,6 +71,19 @@ impl Service {
         page: ListRequest,
     ) -> ServiceResult<ListPage<Owned<StoredVolume>>> {
         let catalogue = self.items().catalogue();
+        if filter.search != ScanSearch::default() {
+            let found = catalogue.find_scans(tenant, filter, page).await?;
+            let found = found.ok_or_else(|| {
+                let gone = "The scan at which the page before ended is no longer stored.";
+                invalid_field("cursor", gone).fix("List from the first page on.")
+            })?;
+            let bytes = found.bytes;
+            charge_plan(page, PagePlan { page, bytes }).await?;
+            return Ok(ListPage {
+                items: catalogue.volumes_at(tenant, &found.sequences).await?,
+                next: found.next,
+            });
+        }
         let plan = catalogue.plan_items(tenant, Resource::Volume, filter, page);
         let page = charge_plan(page, plan.await?).await?;
         Ok(catalogue.volumes(tenant, filter, page).await?)
@@ -148,6 +164,11 @@ impl Service {
         page: ListRequest,
     ) -> ServiceResult<ListPage<IntakeGroup>> {
         Ok(self.intake.store.groups(tenant, state, page).await?)
+    }
+
+    /// What the tenant is receiving from other systems.
+    pub async fn receiving(&self, tenant: &Tenant) -> ServiceResult<Receiving> {
+        Ok(self.intake.store.receiving(tenant).await?)
     }
 
     /// Whose scan a volume of the tenant is; `None` if that was never known.

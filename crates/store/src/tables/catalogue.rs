@@ -17,7 +17,7 @@ use ventriform_service::base::records::{
 use ventriform_service::callers::Activity;
 
 /// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
-const HELD_VOLUME: Select = Select {
+pub(super) const HELD_VOLUME: Select = Select {
     columns: "v.bytes, v.files, v.facts",
     size: "octet_length(v.files) + octet_length(v.facts)",
     table: "volumes AS v ON v.id = h.id",
@@ -33,7 +33,7 @@ const HELD_PRODUCT: Select = Select {
 };
 
 /// The columns of an item that a tenant has.
-struct Select {
+pub(super) struct Select {
     /// The columns of its content.
     columns: &'static str,
     /// The bytes of those that are of any size.
@@ -66,11 +66,11 @@ impl Select {
     }
 
     /// The bytes of a row that are of any size.
-    fn bytes(&self) -> String {
+    pub(super) fn bytes(&self) -> String {
         format!("CAST({} + {HELD_SIZE} AS BIGINT)", self.size)
     }
 
-    fn query(&self, columns: Columns) -> QueryBuilder {
+    pub(super) fn query(&self, columns: Columns) -> QueryBuilder {
         let Self { table, volume, .. } = self;
         let columns = match columns {
             Columns::All => format!(

@@ -10,7 +10,7 @@ use ventriform_service::base::records::{
 };
 
 /// The tables that every database has.
-const TABLES: [&str; 24] = [
+const TABLES: [&str; 25] = [
     "api_keys",
     "audit",
     "audit_anchors",
@@ -23,6 +23,7 @@ const TABLES: [&str; 24] = [
     "intake_objects",
     "jobs",
     "label_index",
+    "listed_scans",
     "probe",
     "products",
     "pulled_series",

@@ -11,7 +11,7 @@ use async_trait::async_trait;
 use std::collections::BTreeSet;
 use ventriform_service::base::records::{
     Cutoff, ErasedFile, ErasedItem, ErasureAgent, ErasureReason, Failure, ListPage, ListRequest,
-    Receipt, StoreError, StoreResult, Tenant, Timestamp, random_id,
+    Receipt, Receiving, StoreError, StoreResult, Tenant, Timestamp, random_id,
 };
 use ventriform_service::callers::Activity;
 use ventriform_service::network::intake::{
@@ -208,6 +208,24 @@ impl IntakeStore for SqlStore {
         let query = listed(tenant, state, page).build();
         let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, group, |group| group.sequence)
+    }
+
+    async fn receiving(&self, tenant: &Tenant) -> StoreResult<Receiving> {
+        let row = query(
+            "SELECT count(DISTINCT g.id), count(o.sop_instance), CAST(coalesce(sum(o.bytes), 0) AS BIGINT)
+             FROM intake_groups AS g
+             LEFT JOIN intake_objects AS o ON o.group_id = g.id AND o.file IS NOT NULL
+             WHERE g.tenant = $1 AND g.state IN ('gathering', 'filing')",
+        )
+        .bind(tenant.as_str())
+        .fetch_one(&self.readers)
+        .await?;
+        let count = |column: usize| row.try_get(column).map(rows::unsigned);
+        Ok(Receiving {
+            groups: count(0)?,
+            objects: count(1)?,
+            bytes: count(2)?,
+        })
     }
 
     async fn remove(

@@ -16,6 +16,7 @@ mod pages;
 mod peers;
 mod rows;
 mod scan_erasure;
+mod scan_search;
 mod scans;
 mod times;
 mod totals;

@@ -4,8 +4,8 @@
 
 use super::{
     Bounded, Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest,
-    Owned, PagePlan, Product, Receipt, ScanErasures, ScanFields, Scans, StoreResult, StoredVolume,
-    Tags,
+    Owned, PagePlan, Product, Receipt, ScanErasures, ScanFields, ScanLists, Scans, StoreResult,
+    StoredVolume, Tags,
 };
 use super::{Cutoff, Resource, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -49,7 +49,7 @@ pub enum AddedProduct {
 /// The tables of volumes and products. Every method is one transaction and fails only if the
 /// database does.
 #[async_trait]
-pub trait Catalogue: Custody + Scans + ScanErasures {
+pub trait Catalogue: Custody + Scans + ScanErasures + ScanLists {
     /// Adds a volume, unless it is stored already, and gives it to a tenant; see
     /// [`Catalogue::renew_volume`]. `scan` is what its file says of the scan. Returns whether it is
     /// new for the tenant.

@@ -12,7 +12,7 @@
 //! - **Errors.** A [`Failure`] is a reason with advice, a [`StoreError`] a failure of the database or the files.
 //!
 //! [`JobStore`] keeps jobs, [`Catalogue`] items and whose they are, [`BlobStore`] their files, [`Scans`] whose scans
-//! the volumes are; [`Custody`] looks after all of them, [`Peers`] tells processes on one store of each other. The
+//! the volumes are, [`ScanLists`] the list of them; [`Custody`] looks after all of them, [`Peers`] tells processes on one store of each other. The
 //! crate `ventriform-store` implements them.
 //!
 //! Guaranteed by every implementation: each method is one transaction. Not guaranteed: that a method called again
@@ -36,6 +36,7 @@ mod product;
 mod resource;
 mod scan;
 mod scan_erasure;
+mod scan_search;
 mod service_clock;
 mod store_error;
 mod tenant;
@@ -69,6 +70,10 @@ pub use resource::Resource;
 pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
 pub use scan_erasure::{
     SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
+};
+pub use scan_search::{
+    FoundScans, JobOnScan, MadeOfScan, Receiving, RestOrStress, ScanLists, ScanOrder, ScanSearch,
+    SearchedWords,
 };
 pub use service_clock::{DOUBT_LASTS, ServiceClock};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};

@@ -4,7 +4,7 @@
 //! Content is stored once, however many tenants have it. Each has a [`Ownership`] of its own, and
 //! sees neither the others nor what they call the item.
 
-use super::{ScanFilter, ScanIdentity};
+use super::{ScanFilter, ScanIdentity, ScanSearch};
 use super::{Tenant, Timestamp};
 use std::collections::BTreeMap;
 use std::ops::Deref;
@@ -88,4 +88,6 @@ pub struct ItemFilter {
     pub tags: TagFilter,
     /// Only those of these scans, or made of them.
     pub scan: ScanFilter,
+    /// Of volumes, which of them and in which order: [`ScanLists`](super::ScanLists) alone reads it.
+    pub search: ScanSearch,
 }

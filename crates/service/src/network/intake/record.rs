@@ -6,7 +6,7 @@ use crate::base::records::{
     BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant,
 };
 use crate::base::records::{
-    BlobWriter, Cutoff, ErasureAgent, ErasureReason, Receipt, Timestamp, TrustedNow,
+    BlobWriter, Cutoff, ErasureAgent, ErasureReason, Receipt, Receiving, Timestamp, TrustedNow,
 };
 use async_trait::async_trait;
 use std::collections::BTreeSet;
@@ -251,6 +251,9 @@ pub trait IntakeStore: Send + Sync + 'static {
         state: Option<GroupState>,
         page: ListRequest,
     ) -> StoreResult<ListPage<IntakeGroup>>;
+
+    /// What a tenant is receiving: its groups that are gathering or filing.
+    async fn receiving(&self, tenant: &Tenant) -> StoreResult<Receiving>;
 
     /// Erases a tenant's group. Returns the files of its objects, which are yet to be deleted, and the receipt, which
     /// was written in the same transaction with the row of the audit trail; `None` if it has none with that id.
