@@ -185,6 +185,7 @@ impl KnownPosition {
             centre: self.centre.or(self.seed_point.map(position)),
             axis: self.axis,
             region: corners,
+            infarcted: false,
         })
     }
 }

@@ -19,6 +19,10 @@ use crate::mesh::shapes;
 
 /// Spacing of the places where hollow balls are tried, mm.
 const SEARCH_STRIDE_MM: f64 = 8.0;
+/// Radii of the balls' shells, mm: those of the middle of the wall.
+const BALL_RADII_MM: [f64; 3] = [22.0, 27.0, 33.0];
+/// Radius of the ball for hearts of 300 ml and more, mm.
+const LARGEST_BALL_RADIUS_MM: f64 = 42.0;
 /// Most places returned.
 const MAX_CANDIDATES: usize = 60;
 /// Balls whose shell is darker than this share of the brightest value are left out.
@@ -35,9 +39,9 @@ pub fn places(
     monitor: &Monitor,
 ) -> Result<Vec<Vec3>, Cancelled> {
     let padded = Padded::new(field);
-    let balls: Vec<Ball> = [22.0, 27.0, 33.0]
-        .iter()
-        .map(|radius| Ball::new(*radius, field, &padded))
+    let very_large = hints.infarcted.then_some(LARGEST_BALL_RADIUS_MM);
+    let balls: Vec<Ball> = (BALL_RADII_MM.into_iter().chain(very_large))
+        .map(|radius| Ball::new(radius, field, &padded))
         .collect();
     let [nx, ny, nz] = field.shape();
     let mut scores = vec![f32::NEG_INFINITY; nx * ny * nz];
@@ -115,7 +119,7 @@ struct Padded {
 }
 
 /// The largest ball's outer samples, mm.
-const MAX_BALL_RADIUS_MM: f64 = 33.0 + 17.0;
+const MAX_BALL_RADIUS_MM: f64 = LARGEST_BALL_RADIUS_MM + 17.0;
 
 impl Padded {
     fn new(field: &Field) -> Self {

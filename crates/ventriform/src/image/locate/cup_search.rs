@@ -45,6 +45,8 @@ const AXIS_PRIOR: f64 = 0.06;
 const USUAL_LENGTH: (f64, f64) = (75.0, 0.25);
 /// Lengths tried first, mm.
 const FIRST_LENGTHS_MM: [f64; 3] = [60.0, 74.0, 92.0];
+/// Length tried as well where very large hearts are looked for, mm.
+const VERY_LARGE_LENGTH_MM: f64 = 118.0;
 /// Cups that are moved, turned and scaled.
 const MOVED_CUPS: usize = 40;
 /// Directions that are also tried with the other lengths.
@@ -213,6 +215,9 @@ impl<'a> CupSearch<'a> {
         for n in 0..PROMISING_DIRECTIONS {
             let axis = best[n].cup.axis;
             best.extend([turned(axis, short), turned(axis, long)]);
+            if self.hints.infarcted {
+                best.push(turned(axis, VERY_LARGE_LENGTH_MM));
+            }
         }
         best.sort_by(|a, b| b.score.total_cmp(&a.score));
         let first = best[0].cup.axis;

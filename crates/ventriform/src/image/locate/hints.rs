@@ -15,6 +15,8 @@ pub struct Hints {
     pub axis: Option<Vec3>,
     /// The cavity's centre must lie in this box, LPS mm.
     pub region: Option<Aabb>,
+    /// A usual heart was looked for in vain: only walls that infarcts leave are candidates, and very large ones.
+    pub infarcted: bool,
 }
 
 impl Hints {

@@ -115,6 +115,16 @@ impl Cups {
         Ok(())
     }
 
+    /// Leaves only the walls that infarcts leave ([`cup_search::infarcted`]).
+    ///
+    /// # Errors
+    /// [`LocateError::Cancelled`].
+    pub fn infarcted(self, monitor: &Monitor) -> Result<Self, LocateError> {
+        let mut found = cup_search::infarcted(&self.field, &self.hints, &self.found, monitor)?;
+        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(Self { found, ..self })
+    }
+
     /// The best cup that is open at the base, among those whose centre is `admitted`.
     ///
     /// # Errors

@@ -13,7 +13,8 @@
 //!    ceiling at which a clear cup scores highest decides.
 //!    If none is clear though a hint says where the heart is, cups with a dark arc, as infarcts of one or two
 //!    territories leave them, are tried as well ([`cup_search::infarcted`]): a whole cup is drawn to whatever is closed
-//!    on all sides beside such a heart. Without a hint they are not believed: they also fit beside hearts.
+//!    on all sides beside such a heart. Without a hint they also fit beside hearts: there they are tried when all else
+//!    was refused ([`Hints::infarcted`]), with very large ones, and the fit decides.
 //! 4. Where no cup will do either, the heart is doubtful: [`Heart::localisation`] is an error, and
 //!    [`Heart::cavity`] is the best proposal of the rays, whatever its score.
 //!
@@ -106,6 +107,16 @@ pub fn find<'v>(
 ) -> Result<Heart<'v>, LocateError> {
     hot_voxels::check(volume)?;
     let rays = RaySearch::new(volume, monitor)?;
+    if hints.infarcted {
+        let cups = Cups::everywhere(volume, hints, monitor)?.infarcted(monitor)?;
+        let decision = by_cups(cups)?;
+        return Ok(Heart {
+            volume,
+            hints: hints.clone(),
+            rays,
+            decision,
+        });
+    }
     let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
     let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
     let clear = match &proposal {
@@ -123,12 +134,7 @@ pub fn find<'v>(
                     None => {}
                 }
             }
-            let place = match cups.best(|_| true) {
-                Ok(best) => Some(best.cup.centre),
-                Err(LocateError::NoHeart { .. }) => None,
-                Err(error) => return Err(error),
-            };
-            Decision::Cups(Box::new(cups), place)
+            by_cups(cups)?
         }
     };
     Ok(Heart {
@@ -137,6 +143,19 @@ pub fn find<'v>(
         rays,
         decision,
     })
+}
+
+/// The decision by the best of `cups`.
+///
+/// # Errors
+/// [`LocateError::Cancelled`].
+fn by_cups(cups: Cups) -> Result<Decision, LocateError> {
+    let place = match cups.best(|_| true) {
+        Ok(best) => Some(best.cup.centre),
+        Err(LocateError::NoHeart { .. }) => None,
+        Err(error) => return Err(error),
+    };
+    Ok(Decision::Cups(Box::new(cups), place))
 }
 
 /// The cups of `volume` below the ceiling at which the best one is clear and scores highest; `None` where none is

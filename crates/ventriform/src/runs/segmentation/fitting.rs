@@ -8,7 +8,7 @@ use crate::heart::deform::{DeformError, DeformParameters, OrganPosition, WallEdg
 use crate::heart::fit::{Fit, fit_at};
 use crate::heart::judge::{Evidence, consensus};
 use crate::heart::model::Template;
-use crate::image::locate::LocateError;
+use crate::image::locate::{Hints, LocateError};
 use crate::image::volume::Volume;
 use crate::parameters::ParameterError;
 use rayon::prelude::*;
@@ -180,10 +180,47 @@ pub fn fit_built_in(
 /// Fits every template to the organ in `volume`. Where half of the built-in hearts find no wall, or more,
 /// the fits of the others are left out: they took something else for one.
 ///
+/// Where no heart is found and no hint says where it is, the walls that infarcts leave are tried, and very large hearts.
+/// They are judged as the others are; their place is always doubted.
+///
 /// # Errors
 /// Where the organ is not found, no template can be fitted (the first one's error), or the caller
 /// asked for an end.
 pub fn try_all(
+    volume: &Volume,
+    templates: &[NamedTemplate],
+    parameters: &DeformParameters,
+    search: &mut OrganSearch,
+    monitor: &Monitor,
+) -> Result<Trials, SegmentationError> {
+    let usual = fit_all(volume, templates, parameters, search, monitor);
+    let refused = matches!(
+        usual,
+        Err(SegmentationError::NotFound(LocateError::NoHeart { .. }))
+    );
+    if !refused || parameters.hints.centre.is_some() {
+        return usual;
+    }
+    let hints = Hints {
+        infarcted: true,
+        ..parameters.hints.clone()
+    };
+    let infarcted = DeformParameters {
+        hints,
+        ..parameters.clone()
+    };
+    let mut again = OrganSearch::default();
+    let found = fit_all(volume, templates, &infarcted, &mut again, monitor);
+    monitor.check()?;
+    if found.is_ok() {
+        *search = again;
+        return found;
+    }
+    usual
+}
+
+/// Fits every template to the organ in `volume`, by one search.
+fn fit_all(
     volume: &Volume,
     templates: &[NamedTemplate],
     parameters: &DeformParameters,
