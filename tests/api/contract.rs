@@ -1326,6 +1326,7 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
     let both = ItemFilter {
         tags: tag_filter("é"),
         scan: scan_filter("1.2.é"),
+        ..ItemFilter::default()
     };
     let found = on.b.volumes(&tenant(), &both, ALL).await.unwrap();
     assert_eq!(found.items.len(), 1);

@@ -497,11 +497,13 @@ pub(super) async fn a_search_knows_what_has_changed(on: &Stores) {
         .await
         .unwrap();
     assert!(finds(&fitted).await);
-    let erased =
-        on.a.erase(&erasure(&fit.id, false), &[fit.id.clone()], now());
-    assert!(matches!(erased.await.unwrap(), Erased::Done(_)));
+    let erase = async |id: &String| {
+        let (order, alone) = (erasure(id, false), [id.clone()]);
+        let erased = on.a.erase(&order, &alone, now()).await.unwrap();
+        assert!(matches!(erased, Erased::Done(_)), "{erased:?}");
+    };
+    erase(&fit.id).await;
     assert!(!finds(&fitted).await);
-    let erased = on.a.erase(&erasure(&id, false), &[id.clone()], now());
-    assert!(matches!(erased.await.unwrap(), Erased::Done(_)));
+    erase(&id).await;
     assert!(!finds(&|s| s.order = ScanOrder::Name).await);
 }

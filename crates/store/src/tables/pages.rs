@@ -163,6 +163,7 @@ mod tests {
                 let filter = ItemFilter {
                     tags: tags(on(0), on(1)),
                     scan: scan(on(2), on(3), on(4)),
+                    ..ItemFilter::default()
                 };
                 let narrow = [
                     (on(0), "external_id=?"),

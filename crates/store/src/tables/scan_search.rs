@@ -56,7 +56,10 @@ impl ScanLists for SqlStore {
     ) -> StoreResult<Option<FoundScans>> {
         let after = match page.before {
             None => None,
-            Some(sequence) => match self.place(tenant, filter.search.order, sequence).await? {
+            Some(sequence) => match self
+                .place_in_list(tenant, filter.search.order, sequence)
+                .await?
+            {
                 None => return Ok(None),
                 found => found,
             },
@@ -98,7 +101,7 @@ impl ScanLists for SqlStore {
 
 impl SqlStore {
     /// Where the row with that sequence number is in a list; `None` if it is not there to tell.
-    async fn place(
+    async fn place_in_list(
         &self,
         tenant: &Tenant,
         order: ScanOrder,
