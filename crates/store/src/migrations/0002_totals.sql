@@ -39,20 +39,21 @@ INSERT INTO stored_items (kind, items)
     SELECT 'volume', count(*) FROM volumes HAVING count(*) > 0
     UNION ALL SELECT kind, count(*) FROM products GROUP BY kind;
 
--- Volumes and products: their rows are of all tenants that have them.
+-- Volumes and products: their rows are of all tenants that have them. Without the sign, SQLite would look for the few
+-- owners of a volume among all volumes.
 CREATE TRIGGER volume_counted AFTER INSERT ON volumes BEGIN
     INSERT INTO stored_items VALUES ('volume', 1) ON CONFLICT (kind) DO UPDATE SET items = items + 1;
-    INSERT INTO stored_bytes SELECT tenant, NEW.bytes FROM holdings WHERE id = NEW.id AND kind = 'volume'
+    INSERT INTO stored_bytes SELECT tenant, NEW.bytes FROM holdings WHERE id = NEW.id AND +kind = 'volume'
     ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;
 END;
 CREATE TRIGGER volume_discounted AFTER DELETE ON volumes BEGIN
     UPDATE stored_items SET items = items - 1 WHERE kind = 'volume';
     UPDATE stored_bytes SET bytes = bytes - OLD.bytes
-    WHERE tenant IN (SELECT tenant FROM holdings WHERE id = OLD.id AND kind = 'volume');
+    WHERE tenant IN (SELECT tenant FROM holdings WHERE id = OLD.id AND +kind = 'volume');
 END;
 CREATE TRIGGER volume_recounted AFTER UPDATE OF bytes ON volumes WHEN NEW.bytes != OLD.bytes BEGIN
     UPDATE stored_bytes SET bytes = bytes + NEW.bytes - OLD.bytes
-    WHERE tenant IN (SELECT tenant FROM holdings WHERE id = NEW.id AND kind = 'volume');
+    WHERE tenant IN (SELECT tenant FROM holdings WHERE id = NEW.id AND +kind = 'volume');
 END;
 CREATE TRIGGER product_counted AFTER INSERT ON products BEGIN
     INSERT INTO stored_items VALUES (NEW.kind, 1) ON CONFLICT (kind) DO UPDATE SET items = items + 1;

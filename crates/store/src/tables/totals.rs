@@ -55,3 +55,46 @@ impl SqlStore {
         transaction.commit().await
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::DiskGauge;
+    use std::time::Duration;
+
+    /// What a trigger reads is read again at every write, so none of it may be more the more is stored.
+    #[tokio::test]
+    async fn the_owners_of_what_is_counted_are_found_by_its_id() {
+        let folder = tempfile::tempdir().unwrap();
+        let gauge = DiskGauge::new(folder.path(), None);
+        let path = folder.path().join("totals.db");
+        let store = SqlStore::open(&path, Duration::from_secs(1), gauge).await;
+        let store = store.unwrap();
+        let triggers =
+            "SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND sql LIKE '%stored_bytes%'";
+        let triggers = query(triggers).fetch_all(&store.readers).await.unwrap();
+        let triggers: Vec<String> = rows::all(triggers, |row| row.try_get(0)).unwrap();
+        let owners = |text: &str| -> Vec<String> {
+            let found = text.split("SELECT tenant").skip(1);
+            let found = found.filter_map(|rest| rest.split_once(" FROM holdings WHERE "));
+            let ends = |c: char| c == ')' || c == '\n' || c == ';';
+            let conditions = found.filter_map(|(_, rest)| rest.split(ends).next());
+            conditions
+                .map(|text| text.replace("NEW.id", "'x'").replace("OLD.id", "'x'"))
+                .collect()
+        };
+        let conditions: Vec<String> = triggers.iter().flat_map(|text| owners(text)).collect();
+        assert_eq!(conditions.len(), 6, "{conditions:#?}");
+        for condition in conditions {
+            let plan = format!("EXPLAIN QUERY PLAN SELECT tenant FROM holdings WHERE {condition}");
+            let plan = query(plan).fetch_all(&store.readers).await.unwrap();
+            let plan: Vec<String> = rows::all(plan, |row| row.try_get("detail")).unwrap();
+            assert_eq!(
+                plan,
+                ["SEARCH holdings USING INDEX holdings_by_item (id=?)"],
+                "{condition}"
+            );
+        }
+        store.close().await;
+    }
+}
