@@ -229,8 +229,11 @@ mod tests {
     use super::*;
     use dicom_encoding::transfer_syntax::Endianness;
 
+    /// Numbers of attributes.
+    type Given<'a> = &'a [(Attribute, &'a [u16])];
+
     /// Attributes with these vectors and numbers.
-    fn with(given: &[(Attribute, &[u16])]) -> Attributes {
+    fn with(given: Given) -> Attributes {
         let mut a = Attributes::new("raw.dcm", Endianness::Little);
         for (attribute, numbers) in given {
             let bytes = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
@@ -239,7 +242,7 @@ mod tests {
         a
     }
 
-    fn order(given: &[(Attribute, &[u16])], gated: bool) -> Result<ViewOrder, ReadError> {
+    fn order(given: Given, gated: bool) -> Result<ViewOrder, ReadError> {
         let frames = given[0].1.len();
         ViewOrder::new(&with(given), frames, gated, &mut Vec::new())
     }
@@ -275,7 +278,7 @@ mod tests {
     #[test]
     fn contradicting_vectors_are_refused_by_name() {
         let views: (Attribute, &[u16]) = (ANGULAR_VIEW_VECTOR, &[1, 2, 1, 2]);
-        let cases: [(&[(Attribute, &[u16])], bool, Attribute); 7] = [
+        let cases: [(Given, bool, Attribute); 7] = [
             (&[views], false, ANGULAR_VIEW_VECTOR),
             (
                 &[(DETECTOR_VECTOR, &[1, 1, 2, 2])],
