@@ -421,7 +421,7 @@ pub(super) async fn pages_of_a_search_have_no_gaps_while_scans_come_and_go(on: &
         .find(|scan| Some(scan.sequence) == gone)
         .unwrap();
     let id = id.id.clone();
-    let expected_ids = std::slice::from_ref(&id).into_iter();
+    let expected_ids = [id.clone()].into_iter();
     let all: Vec<String> = on.a.made_of(&tenant(), &id).await.unwrap();
     let all: Vec<String> = expected_ids.chain(all).collect();
     let erased = on.a.erase(&erasure(&id, true), &all, now()).await.unwrap();
@@ -498,7 +498,7 @@ pub(super) async fn a_search_knows_what_has_changed(on: &Stores) {
         .unwrap();
     assert!(finds(&fitted).await);
     let erase = async |id: &String| {
-        let (order, alone) = (erasure(id, false), std::slice::from_ref(&id));
+        let (order, alone) = (erasure(id, false), [id.clone()]);
         let erased = on.a.erase(&order, &alone, now()).await.unwrap();
         assert!(matches!(erased, Erased::Done(_)), "{erased:?}");
     };
