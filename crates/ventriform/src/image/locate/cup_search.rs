@@ -41,10 +41,6 @@ const COARSE_BLUR_MM: f64 = 4.0;
 const USUAL_AXIS: [f64; 3] = [0.64, -0.61, -0.44];
 /// Loss of score from the usual axis to one at a right angle to it.
 const AXIS_PRIOR: f64 = 0.06;
-/// Cosine of the greatest angle from the usual axis at which a part of a wall is believed, 60 degrees. Of 19 such
-/// hearts all lie nearer; both of two that were taken for hearts in 32 scans without one pointed to the right or up
-/// (seeds 9501 and 9502).
-const MIN_USUAL_COSINE: f64 = 0.5;
 /// Mean length of hearts, mm, base plane to outer apex, and its logarithmic spread.
 const USUAL_LENGTH: (f64, f64) = (75.0, 0.25);
 /// Lengths tried first, mm.
@@ -302,12 +298,6 @@ pub fn infarcted(
         })
         .collect::<Result<_, Cancelled>>()?;
     Ok(climbed.concat())
-}
-
-/// Whether the apex of `cup` points where that of a heart may, within [`MIN_USUAL_COSINE`] of the usual direction.
-pub fn points_as_usual(cup: &Cup) -> bool {
-    let usual = Vec3::from(USUAL_AXIS).normalize();
-    cup.axis.dot(&usual) >= MIN_USUAL_COSINE
 }
 
 /// The axis directions that are tried.

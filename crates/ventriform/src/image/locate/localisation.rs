@@ -115,18 +115,12 @@ impl Cups {
         Ok(())
     }
 
-    /// Leaves only the walls that infarcts leave ([`cup_search::infarcted`]) and that point where a heart may.
+    /// Leaves only the walls that infarcts leave ([`cup_search::infarcted`]).
     ///
     /// # Errors
-    /// [`LocateError::NoCandidate`] where there is none, [`LocateError::Cancelled`].
+    /// [`LocateError::Cancelled`].
     pub fn infarcted(self, monitor: &Monitor) -> Result<Self, LocateError> {
         let mut found = cup_search::infarcted(&self.field, &self.hints, &self.found, monitor)?;
-        if self.hints.axis.is_none() {
-            found.retain(|found| cup_search::points_as_usual(&found.cup));
-        }
-        if found.is_empty() {
-            return Err(LocateError::NoCandidate);
-        }
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(Self { found, ..self })
     }
