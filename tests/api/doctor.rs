@@ -150,8 +150,8 @@ async fn totals_that_are_not_the_sums_are_found_and_made_anew() {
         "{said}"
     );
     let repair = Repair::default();
-    let repaired = examine(data.path(), None, Some(&repair));
-    assert!(repaired.await.unwrap().is_healthy());
+    let repaired = examine(data.path(), None, Some(&repair)).await.unwrap();
+    assert!(repaired.is_healthy(), "{repaired:?}");
     assert_eq!(usage().await, stored);
     let again = examine(data.path(), None, None).await.unwrap();
     assert!(again.findings.is_empty(), "{again:?}");
