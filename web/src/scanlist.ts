@@ -1,7 +1,7 @@
 // The list of scans: searched, filtered and ordered by the service over all that it stores, read page by page, and
 // looked at again while it is open, so that it shows what arrives and what goes.
 
-import { type Page, Unreachable, type Volume, changedPage, get, page, reachable, words } from "./api";
+import { type Page, Unreachable, type Volume, changedPage, fieldOf, get, page, reachable, words } from "./api";
 import type { Role } from "./pairing";
 import { Watched } from "./state";
 import { onTold, tellTabs } from "./tabs";
@@ -98,9 +98,15 @@ export async function readList(): Promise<void> {
 export async function loadMore(): Promise<void> {
   if (!more.value) return;
   const own = turn;
-  const next = await page<Volume>("volumes", { ...query(asked.value, PAGE), cursor: more.value });
+  const rows = { ...query(asked.value, PAGE), cursor: more.value };
+  const next = await page<Volume>("volumes", rows).catch(async error => {
+    // The row was erased from which the list went on.
+    if (fieldOf(error) !== "cursor") throw error;
+    await readList();
+    return null;
+  });
   // Another list was asked for meanwhile.
-  if (own !== turn) return;
+  if (!next || own !== turn) return;
   const known = new Set(listed.value.map(volume => volume.id));
   listed.value = [...listed.value, ...next.items.filter(volume => !known.has(volume.id))];
   more.value = next.next;
