@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Measures whether what a service does costs more, the more it stores.
 
-    scripts/measure/stored_cost.py [--program target/release/ventriform] [--few 1000] [--many 100000] [--engine sqlite]
+    scripts/measure/stored_cost.py [--program target/release/ventriform] [--few 1000] [--many 100000]
+                                   [--engine sqlite]
 
-Starts two services side by side, one with FEW studies and one with MANY: a scan with identity, labels and external id, a
-model of it, the job that made it, and their rows of the audit trail. One study of each goes through the service; its
+Starts two services side by side, one with FEW studies and one with MANY: a scan with identity, labels and external id,
+a model of it, the job that made it, and their rows of the audit trail. One study of each goes through the service; its
 rows are then multiplied in the database, in which the service's own triggers do what they do for the service. A quota is
 set, so that everything stored counts. Then both are asked in turn, TURNS times:
 
@@ -17,7 +18,8 @@ set, so that everything stored counts. Then both are asked in turn, TURNS times:
 
 Prints ms: of requests the median with few studies and the median difference of a pair, of statements the least fifth.
 Ends with status 1 if a ratio is above 1.1 and the difference above what is resolved (0.1 ms). Other statements that
-take longer with many studies are printed for information. Quiet machines only; Python 3 alone, and PostgreSQL for that engine.
+take longer with many studies are printed for information. Quiet machines only; Python 3 alone, and PostgreSQL for that
+engine.
 """
 
 import argparse
@@ -58,7 +60,14 @@ CLAIM = re.compile(r"attempts = attempts \+ 1, lease_token")
 SWEEP = re.compile(r"AS since, x\.sequence FROM|interruptions = interruptions \+ 1")
 
 # The tables of a study, each with the column that names the items of its rows.
-STUDY_TABLES = [("volumes", "id"), ("products", "id"), ("holdings", "id"), ("sources", "id"), ("scans", "volume"), ("jobs", "id")]
+STUDY_TABLES = [
+    ("volumes", "id"),
+    ("products", "id"),
+    ("holdings", "id"),
+    ("sources", "id"),
+    ("scans", "volume"),
+    ("jobs", "id"),
+]
 WRONG_TOTALS = """SELECT count(*) FROM (SELECT tenant, sum(bytes) AS bytes FROM stored GROUP BY tenant) AS s
     WHERE bytes != coalesce((SELECT bytes FROM stored_bytes AS b WHERE b.tenant = s.tenant), 0)"""
 
@@ -227,7 +236,8 @@ class Ward:
         if isinstance(self.database, OnSqlite):
             found = self.database.database.execute(f"PRAGMA table_info({table})")
             return next(kind for _, name, kind, *_ in found if name == column)
-        text = f"SELECT data_type FROM information_schema.columns WHERE table_name = '{table}' AND column_name = '{column}'"
+        named = f"table_name = '{table}' AND column_name = '{column}'"
+        text = f"SELECT data_type FROM information_schema.columns WHERE {named}"
         return self.database.rows(text)[0][0]
 
     def record(self, job):

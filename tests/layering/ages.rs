@@ -130,6 +130,8 @@ const COMPARISONS: &[(&str, &str)] = &[
     ("tables/catalogue.rs: renewed_at >", "the later stamp"),
     ("tables/jobs.rs: renewed_at >", "the later stamp"),
     ("tables/hooks.rs: former_until >", "signs a while longer"),
+    ("tables/scan_search.rs: created_at >", "asked for"),
+    ("tables/scan_search.rs: created_at <", "asked for"),
 ];
 
 /// The texts of the searched files without their tests.

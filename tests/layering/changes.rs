@@ -82,6 +82,7 @@ const WITHOUT_ROW: &[(&str, &str)] = &[
     ("tables/peers.rs: unpin", "a request has read"),
     ("tables/times.rs: note_trusted", "the time"),
     // Derived from rows that are there.
+    ("tables/totals.rs: recount", "sums of rows that have theirs"),
     (
         "tables/owners.rs: restore_sources",
         "from the product's row",

@@ -132,8 +132,7 @@ export function sliceAt(
   const { count, ends, restShift } = rows[kind]!;
   const at = ends[0] + ((ends[1] - ends[0]) * number) / Math.max(1, count - 1);
   const shift = scan === "rest" ? restShift : 0;
-  if (kind === 0)
-    return { plane: short, origin: add(mix(heart.apex, heart.base, at), scale(short.normal, -shift)) };
+  if (kind === 0) return { plane: short, origin: add(mix(heart.apex, heart.base, at), scale(short.normal, -shift)) };
   const plane = kind === 1 ? vertical : horizontal;
   return { plane, origin: add(middle, scale(plane.normal, at * length + shift)) };
 }

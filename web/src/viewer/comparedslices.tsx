@@ -2,15 +2,7 @@
 
 import { useWatched } from "../state";
 import { useCanvas } from "./canvas";
-import {
-  type Compared,
-  type ComparedHeart,
-  KINDS,
-  type Row,
-  sliceAt,
-  spacingOf,
-  wallFrameOf,
-} from "./compared";
+import { type Compared, type ComparedHeart, KINDS, type Row, sliceAt, spacingOf, wallFrameOf } from "./compared";
 import type { ComparedScene } from "./comparedscene";
 import { type Look, brightestOf, contours, label, paintVoxels } from "./drawing";
 import { type Plane, point } from "./plane";

@@ -128,9 +128,10 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
         )}
       </div>
       <p class="quiet">
-        Slices: {shownAs(scene)}. Maps: uptake in per cent of the hottest quarter of each scan’s own wall; where stress is compared with rest, it was
-        scaled by {number(1 / report.scale, 2)} over {number(report.matched_percent, 0, "%")} of the wall. Comparison{" "}
-        <code>{result.id}</code>; stress <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
+        Slices: {shownAs(scene)}. Maps: uptake in per cent of the hottest quarter of each scan’s own wall; where stress
+        is compared with rest, it was scaled by {number(1 / report.scale, 2)} over{" "}
+        {number(report.matched_percent, 0, "%")} of the wall. Comparison <code>{result.id}</code>; stress{" "}
+        <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
       </p>
       <Foot page={1} of={1} />
     </section>

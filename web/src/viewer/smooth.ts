@@ -4,7 +4,7 @@
 // right angles to their normals there; neighbours share the curve of their edge. For pictures only: no figure is
 // measured on it.
 
-import { type Mesh } from "./mesh";
+import type { Mesh } from "./mesh";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
 /** Parts of each edge: pieces of a contour are then 1 to 3 mm long. */

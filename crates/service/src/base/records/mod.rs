@@ -36,6 +36,7 @@ mod product;
 mod resource;
 mod scan;
 mod scan_erasure;
+mod scan_lists;
 mod scan_search;
 mod service_clock;
 mod store_error;
@@ -71,10 +72,8 @@ pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
 pub use scan_erasure::{
     SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
 };
-pub use scan_search::{
-    FoundScans, JobOnScan, MadeOfScan, Receiving, RestOrStress, ScanLists, ScanOrder, ScanSearch,
-    SearchedWords,
-};
+pub use scan_lists::{FoundScans, Receiving, ScanLists};
+pub use scan_search::{JobOnScan, MadeOfScan, RestOrStress, ScanOrder, ScanSearch, SearchedWords};
 pub use service_clock::{DOUBT_LASTS, ServiceClock};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};

@@ -4,20 +4,7 @@
 //! threshold lies in inferior segments. Not guaranteed: which part of that wall is attenuated and which malperfused;
 //! only limits of scans without correction tell them apart.
 
-use super::document::PolarSummary;
-use serde::{Deserialize, Serialize};
-
-/// What attenuation may have to do with the extent of a map.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-pub struct PolarAttenuation {
-    /// False if the header or the caller says that attenuation was not corrected; null if nothing says it.
-    pub corrected: Option<bool>,
-    /// The part of `extent_percent` that lies in inferior, inferoseptal and inferolateral segments.
-    pub inferior_extent_percent: f64,
-    /// Both in words, and what is usual without correction.
-    pub note: String,
-}
+use super::document::{PolarAttenuation, PolarSummary, round};
 
 impl PolarSummary {
     /// The summary with a note on attenuation, if the map has sides, attenuation was not `corrected` for sure, and
@@ -46,7 +33,7 @@ impl PolarSummary {
         if wall <= 0.0 || below <= 0.0 {
             return None;
         }
-        let part = super::document::round(below / wall);
+        let part = round(below / wall);
         let said = match corrected {
             None => "Nothing says that attenuation was corrected",
             Some(_) => "Attenuation was not corrected",

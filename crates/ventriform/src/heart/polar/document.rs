@@ -1,6 +1,5 @@
 //! The polar map as it is written in `polar.json` and summed up in reports, and maps of other figures.
 
-use super::attenuation::PolarAttenuation;
 use super::figure::{FigureMap, WallFigure};
 use super::picture::rings;
 use super::{Pixel, PlaceState, PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
@@ -36,6 +35,18 @@ pub struct PolarSummary {
     /// no normal limits were used, and inferior wall lies below the threshold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attenuation: Option<PolarAttenuation>,
+}
+
+/// What attenuation may have to do with the extent of a map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct PolarAttenuation {
+    /// False if the header or the caller says that attenuation was not corrected; null if nothing says it.
+    pub corrected: Option<bool>,
+    /// The part of `extent_percent` that lies in inferior, inferoseptal and inferolateral segments.
+    pub inferior_extent_percent: f64,
+    /// Both in words, and what is usual without correction.
+    pub note: String,
 }
 
 /// A polar map, as in `polar.json`.

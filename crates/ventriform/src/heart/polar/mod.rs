@@ -45,9 +45,9 @@ mod levels;
 mod picture;
 mod smoothing;
 
-pub use attenuation::PolarAttenuation;
 pub use document::{
-    FigureDocument, FigureSegment, PolarDocument, PolarSegment, PolarSummary, PolarTerritory,
+    FigureDocument, FigureSegment, PolarAttenuation, PolarDocument, PolarSegment, PolarSummary,
+    PolarTerritory,
 };
 pub use figure::{FigureMap, WallFigure};
 pub use levels::{Level, Levels};
