@@ -6,8 +6,8 @@
 
 Starts two services side by side, one with FEW studies and one with MANY: a scan with identity, labels and external id,
 a model of it, the job that made it, and their rows of the audit trail. One study of each goes through the service; its
-rows are then multiplied in the database, in which the service's own triggers do what they do for the service. A quota is
-set, so that everything stored counts. Then both are asked in turn, TURNS times:
+rows are then multiplied in the database, in which the service's own triggers do what they do for the service. A quota
+is set, so that everything stored counts. Then both are asked in turn, TURNS times:
 
 - job: file a job. It fails at once, and its end is waited for;
 - list: first pages of volumes, models and jobs;
