@@ -638,6 +638,7 @@ def received(walk):
 
 
 def intake(walk):
+    walk.call("get", "/v1/receiving", expect=200)
     return walk.call("get", "/v1/intake", expect=200)[1]["intake"]
 
 

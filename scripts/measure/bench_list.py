@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures the list of scans over many: docs/scale.md says what it gave.
+"""Measures the list of scans over many.
 
     scripts/measure/bench_list.py [--program target/release/ventriform] [--scans 100000] [--postgres]
 
