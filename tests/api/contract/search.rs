@@ -359,7 +359,7 @@ pub(super) async fn scans_are_searched_as_a_whole(on: &Stores) {
         });
         assert_eq!(
             paged(on, &filter, 9, async || ()).await,
-            std::slice::from_ref(&whole),
+            std::slice::from_ref(whole),
             "{word}"
         );
     }

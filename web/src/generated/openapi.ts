@@ -3722,6 +3722,18 @@ export interface components {
              */
             id: string;
         };
+        /** @description What attenuation may have to do with the extent of a map. */
+        PolarAttenuation: {
+            /** @description False if the header or the caller says that attenuation was not corrected; null if nothing says it. */
+            corrected?: boolean | null;
+            /**
+             * Format: double
+             * @description The part of `extent_percent` that lies in inferior, inferoseptal and inferolateral segments.
+             */
+            inferior_extent_percent: number;
+            /** @description Both in words, and what is usual without correction. */
+            note: string;
+        };
         /** @description A figure of the wall on a polar map, as it is written. */
         PolarFigure: {
             /**
@@ -3760,6 +3772,7 @@ export interface components {
         };
         /** @description A polar map, as in `polar.json`. */
         PolarMap: {
+            attenuation?: components["schemas"]["PolarAttenuation"] | null;
             /**
              * Format: int64
              * @description Columns of pixels, around the axis.
@@ -3840,6 +3853,7 @@ export interface components {
         };
         /** @description A polar map without its pixels. */
         PolarSummary: {
+            attenuation?: components["schemas"]["PolarAttenuation"] | null;
             /**
              * Format: int64
              * @description Columns of pixels, around the axis.
@@ -4180,6 +4194,24 @@ export interface components {
          * @enum {string}
          */
         ReceivedState: "gathering" | "filing" | "stored" | "failed";
+        /** @description What is being received from other systems. */
+        Receiving: {
+            /**
+             * Format: int64
+             * @description Size of these, bytes.
+             */
+            bytes: number;
+            /**
+             * Format: int64
+             * @description Number of their objects that have arrived.
+             */
+            objects: number;
+            /**
+             * Format: int64
+             * @description Number of series, and of objects that are volumes of their own, of which objects still arrive or are being read.
+             */
+            series: number;
+        };
         /** @description A delivery that is tried again. */
         Redelivered: components["schemas"]["Delivery"] | components["schemas"]["ObjectDelivery"];
         /** @description A model that could not be fitted. */
@@ -5846,6 +5878,7 @@ export type Perfusion = components['schemas']['Perfusion'];
 export type PhaseReport = components['schemas']['PhaseReport'];
 export type PlaceState = components['schemas']['PlaceState'];
 export type PlannedItem = components['schemas']['PlannedItem'];
+export type PolarAttenuation = components['schemas']['PolarAttenuation'];
 export type PolarFigure = components['schemas']['PolarFigure'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
@@ -5869,6 +5902,7 @@ export type Received = components['schemas']['Received'];
 export type ReceivedLinks = components['schemas']['ReceivedLinks'];
 export type ReceivedList = components['schemas']['ReceivedList'];
 export type ReceivedState = components['schemas']['ReceivedState'];
+export type Receiving = components['schemas']['Receiving'];
 export type Redelivered = components['schemas']['Redelivered'];
 export type RefusedTemplate = components['schemas']['RefusedTemplate'];
 export type Resolution = components['schemas']['Resolution'];
