@@ -151,7 +151,7 @@ fn a_folder_stands_for_its_files() {
         let words = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert!(ended.status.success(), "{words}");
         let page = fs::read_to_string(folder.path().join("r.html")).unwrap();
-        assert_eq!(page.contains(JANE.name), named);
+        assert_eq!(page.contains("Doe, Jane"), named);
         assert_eq!(page.contains(JANE.study), named);
     }
 }

@@ -52,7 +52,7 @@ fn deidentified_objects_name_nobody_and_stay_together() {
     let hers = |bytes: &[u8]| {
         of_jane[..5]
             .iter()
-            .chain([&JANE.study])
+            .chain([&JANE.study, &"Doe, Jane", &"1950-01-02"])
             .any(|text| contains(bytes, text))
     };
     assert!(of_jane.iter().all(|text| contains(&scan, text)));

@@ -344,7 +344,8 @@ pub(super) async fn scans_are_searched_as_a_whole(on: &Stores) {
     on.a.add_product(&model, &tenant(), Some(&scans[3].id), AMPLE_ROOM)
         .await
         .unwrap();
-    let (whole, part) = (&scans[3].id, &scans[3].id[4..12]);
+    // The first eight figures of an id are the minute in which it was made.
+    let (whole, part) = (&scans[3].id, &scans[3].id[4..24]);
     for word in [
         whole.as_str(),
         &whole[..30],

@@ -1,8 +1,9 @@
 -- Running totals of what is stored, on SQLite; those on PostgreSQL stand in ../migrations_postgres/0002_totals.sql.
 --
 -- A quota is compared with all that a tenant stores, before every job, upload and result, within the transaction that
--- writes. Adding it up took time that grew with what is stored: 0.1 s at 1000 studies and 2 s at 100,000. So triggers keep the totals
--- as rows, and the time is the same however much is stored. The same holds for the counts of items that /metrics tells.
+-- writes. Adding it up took time that grew with what is stored: 0.1 s at 1000 studies and 2 s at 100,000. So triggers
+-- keep the totals as rows, and the time is the same however much is stored. The same holds for the counts of items that
+-- /metrics tells.
 --
 -- The totals follow from the other tables: the view `stored` has a row for each thing that counts, and whoever doubts
 -- the totals compares them with its sums (`ventriform doctor`), or makes them anew from it, as this file does.
@@ -130,7 +131,8 @@ CREATE TRIGGER job_discounted AFTER DELETE ON jobs BEGIN
     UPDATE stored_bytes SET bytes = bytes - OLD.bytes WHERE tenant = OLD.tenant;
 END;
 -- The columns of which `bytes` is made. Claims, progress and ends change none of them.
-CREATE TRIGGER job_recounted AFTER UPDATE OF tenant, parameters, needs, labels, external_id, webhook, source, send ON jobs BEGIN
+CREATE TRIGGER job_recounted
+AFTER UPDATE OF tenant, parameters, needs, labels, external_id, webhook, source, send ON jobs BEGIN
     UPDATE stored_bytes SET bytes = bytes - OLD.bytes WHERE tenant = OLD.tenant;
     INSERT INTO stored_bytes VALUES (NEW.tenant, NEW.bytes)
     ON CONFLICT (tenant) DO UPDATE SET bytes = bytes + excluded.bytes;

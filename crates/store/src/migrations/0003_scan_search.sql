@@ -29,7 +29,7 @@ CREATE TABLE listed_scans (
     words          TEXT NOT NULL,
     personal_words TEXT NOT NULL,
     UNIQUE (tenant, volume),
-    FOREIGN KEY (tenant, volume) REFERENCES holdings (tenant, id) ON DELETE CASCADE
+    FOREIGN KEY (tenant, volume) REFERENCES holdings (tenant, id) ON DELETE CASCADE ON UPDATE CASCADE
 ) STRICT;
 
 CREATE INDEX listed_scans_by_arrival ON listed_scans (tenant, sequence);

@@ -20,7 +20,7 @@ CREATE TABLE listed_scans (
     words          TEXT COLLATE "C" NOT NULL,
     personal_words TEXT COLLATE "C" NOT NULL,
     UNIQUE (tenant, volume),
-    FOREIGN KEY (tenant, volume) REFERENCES holdings (tenant, id) ON DELETE CASCADE
+    FOREIGN KEY (tenant, volume) REFERENCES holdings (tenant, id) ON DELETE CASCADE ON UPDATE CASCADE
 );
 
 CREATE INDEX listed_scans_by_arrival ON listed_scans (tenant, sequence);

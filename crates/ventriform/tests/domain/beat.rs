@@ -633,7 +633,7 @@ fn the_page_has_figures_pictures_and_flags() {
         ..Provenance::default()
     };
     let named = String::from_utf8(heart.page(&files, Some(&named)).bytes).unwrap();
-    assert!(named.contains("Doe^Jane"));
+    assert!(named.contains("Doe, Jane"));
     let still = beat_of(&vec![gates()[0].clone(); 8], BeatChoice::default()).unwrap();
     let still = String::from_utf8(still.page(&[], None).bytes).unwrap();
     assert!(
