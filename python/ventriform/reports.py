@@ -1366,11 +1366,28 @@ class PhaseReport(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class PolarAttenuation(Document):
+    """What attenuation may have to do with the extent of a map."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    corrected: bool | None = None
+    """False if the header or the caller says that attenuation was not corrected; null if nothing says it."""
+    inferior_extent_percent: float
+    """The part of `extent_percent` that lies in inferior, inferoseptal and inferolateral segments."""
+    note: str
+    """Both in words, and what is usual without correction."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class PolarMap(Document):
     """A polar map, as in `polar.json`."""
 
-    _built: ClassVar[dict[str, str]] = {"segments": "PolarSegment[]", "territories": "Territory[]"}
+    _built: ClassVar[dict[str, str]] = {"attenuation": "PolarAttenuation", "segments": "PolarSegment[]", "territories": "Territory[]"}
 
+    attenuation: PolarAttenuation | None = None
+    """What attenuation may have to do with the extent; in reports only, where nothing says that it was corrected, no
+    normal limits were used, and inferior wall lies below the threshold."""
     columns: int
     """Columns of pixels, around the axis."""
     direction: str | None = None
@@ -1430,8 +1447,11 @@ class PolarSegment(Document):
 class PolarSummary(Document):
     """A polar map without its pixels."""
 
-    _built: ClassVar[dict[str, str]] = {"segments": "PolarSegment[]", "territories": "Territory[]"}
+    _built: ClassVar[dict[str, str]] = {"attenuation": "PolarAttenuation", "segments": "PolarSegment[]", "territories": "Territory[]"}
 
+    attenuation: PolarAttenuation | None = None
+    """What attenuation may have to do with the extent; in reports only, where nothing says that it was corrected, no
+    normal limits were used, and inferior wall lies below the threshold."""
     columns: int
     """Columns of pixels, around the axis."""
     direction: str | None = None
@@ -2196,9 +2216,9 @@ register(
     Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks,
     JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, NoBeat,
     NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport,
-    PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
-    RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
-    Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses,
-    TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks,
-    WallVolumes,
+    PolarAttenuation, PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets,
+    RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport,
+    Shape, Smoothness, Software, Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory,
+    TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume,
+    VolumeFile, VolumeIntervals, VolumeLinks, WallVolumes,
 )
