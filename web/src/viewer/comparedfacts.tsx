@@ -278,20 +278,24 @@ export function madeWith({
     .join(" · ");
 }
 
-/** What attenuation may have to do with the extents of both scans. */
-export function AttenuationNotes({ report }: { report: ComparisonReport }): ComponentChildren {
+/** What attenuation may have to do with the extents of both scans, a sentence each; nothing where it has nothing. */
+export function attenuationNotes({ stress, rest }: ComparisonReport): string {
   const scans: [string, ComparedScan][] = [
-    ["Stress", report.stress],
-    ["Rest", report.rest],
+    ["Stress", stress],
+    ["Rest", rest],
   ];
-  return scans.map(
-    ([name, { polar }]) =>
-      polar?.attenuation && (
-        <p key={name} class="quiet">
-          {name}: {polar.attenuation.note}
-        </p>
-      ),
-  );
+  return scans
+    .flatMap(([name, { polar }]) => {
+      const attenuation = polar?.attenuation;
+      if (!attenuation) return [];
+      const said =
+        attenuation.corrected === false
+          ? "attenuation was not corrected"
+          : "nothing says that attenuation was corrected";
+      const part = number(attenuation.inferior_extent_percent, 1, "%");
+      return [`${name}: ${part} of the wall lies below the threshold in inferior segments; ${said}.`];
+    })
+    .join(" ");
 }
 
 export function SimulatedNote({ report }: { report: ComparisonReport }): ComponentChildren {

@@ -4,7 +4,6 @@ import type { Volume } from "../api";
 import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
 import {
-  AttenuationNotes,
   Headlines,
   Outdated,
   LimitsUsed,
@@ -12,6 +11,7 @@ import {
   Reasons,
   SimulatedNote,
   TerritoryTable,
+  attenuationNotes,
   madeWith,
 } from "./comparedfacts";
 import { drawMap, endsOf, lutOf } from "./comparedmaps";
@@ -87,7 +87,6 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
           </span>
         ))}
         <SimulatedNote report={report} />
-        <AttenuationNotes report={report} />
       </div>
       <Outdated made={result} />
       <Headlines report={report} />
@@ -130,8 +129,8 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
       <p class="quiet">
         Slices: {shownAs(scene)}. Maps: uptake in per cent of the hottest quarter of each scan’s own wall; where stress
         is compared with rest, it was scaled by {number(1 / report.scale, 2)} over{" "}
-        {number(report.matched_percent, 0, "%")} of the wall. Comparison <code>{result.id}</code>; stress{" "}
-        <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
+        {number(report.matched_percent, 0, "%")} of the wall. {attenuationNotes(report)} Comparison{" "}
+        <code>{result.id}</code>; stress <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
       </p>
       <Foot page={1} of={1} />
     </section>

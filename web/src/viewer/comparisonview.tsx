@@ -23,7 +23,6 @@ import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
 import {
-  AttenuationNotes,
   BeatTable,
   BothMeasures,
   Headlines,
@@ -37,6 +36,7 @@ import {
   SimulatedNote,
   TerritoryTable,
   areNotComparable,
+  attenuationNotes,
   madeWith,
 } from "./comparedfacts";
 import { RowsOfSlices, WindowOfSlices } from "./comparedlook";
@@ -204,7 +204,6 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <Headlines report={compared.report} />
         <BothMeasures report={compared.report} />
         <SimulatedNote report={compared.report} />
-        <AttenuationNotes report={compared.report} />
         {!areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Particulars compared={compared} />
         <Downloads result={compared.result} volume={scans.stress} />
@@ -298,6 +297,7 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
         <summary>How both were matched</summary>
         <MatchTable report={report} />
       </details>
+      {attenuationNotes(report) && <p class="quiet">{attenuationNotes(report)}</p>}
       {(["stress", "rest"] as const).flatMap(scan =>
         report[scan].warnings.map(text => (
           <p key={scan + text} class="warning">
