@@ -314,12 +314,17 @@ pub(super) fn polar_hint(report: &SegmentationReport) -> String {
     };
     let attenuation = polar.and_then(|polar| polar.attenuation.as_ref());
     let attenuation = attenuation.map_or(String::new(), |attenuation| {
-        format!(" {}", attenuation.note)
+        let said = match attenuation.corrected {
+            None => "nothing says that attenuation was corrected",
+            Some(_) => "attenuation was not corrected",
+        };
+        let part = attenuation.inferior_extent_percent;
+        format!(" {part:.1} % of the wall lie below it in inferior segments; {said}.")
     });
     format!(
         "Polar map of the 17 segments of the American Heart Association: apex in the centre, {sides}. In per cent of \
-         the hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold; grey is \
-         outside of the wall.{attenuation}",
+         the hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold.{attenuation} \
+         Grey is outside of the wall.",
         limits_hint(report.perfusion.as_ref())
     )
 }
