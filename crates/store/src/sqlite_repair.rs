@@ -19,9 +19,6 @@ use ventriform_service::callers::AuditEvent;
 /// Tables whose rows are never deleted: their greatest number is how many there were.
 const NEVER_DELETED: &[&str] = &["api_keys", "erasures"];
 
-/// Tables that repeat what others hold, and are made anew of these.
-const KEPT_BY_TRIGGERS: &[&str] = &["label_index", "listed_scans"];
-
 /// Rows of a table without row numbers that are copied at a time.
 const BATCH_ROWS: i64 = 500;
 
@@ -172,7 +169,7 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
     let tables: Vec<String> = sqlx::query_scalar(
         "SELECT name FROM sqlite_schema
          WHERE type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
-           AND name NOT IN ('_sqlx_migrations', 'probe', 'stored_bytes', 'stored_items')",
+           AND name NOT IN ('_sqlx_migrations', 'probe', 'stored_bytes', 'stored_items', 'listed_scans')",
     )
     .fetch_all(&mut *to)
     .await?;
@@ -231,13 +228,12 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
     for statement in RECOUNT {
         run(to, statement).await?;
     }
-    run(to, "DELETE FROM main.listed_scans").await?;
     run(
         to,
         "INSERT INTO main.listed_scans SELECT * FROM main.listed_scans_now",
     )
     .await?;
-    salvaged.retain(|found: &Salvaged| !KEPT_BY_TRIGGERS.contains(&found.table.as_str()));
+    salvaged.retain(|found: &Salvaged| found.table != "label_index");
     for (_, sql) in &triggers {
         run(to, sql.clone()).await?;
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 use ventriform_service::base::records::{
-    JobOnScan, MadeOfScan, RestOrStress, ScanLists, ScanOrder, ScanSearch, SearchedWords,
+    JobOnScan, MadeOfScan, ScanLists, ScanOrder, ScanSearch, SearchedWords, WhichScan,
 };
 
 /// A scan that is searched, as a test knows it.
@@ -273,14 +273,14 @@ fn scan_searches() -> Vec<ScanSearch> {
         }
         add(&|search| search.job = Some(JobOnScan::Failed));
         add(&|search| search.modality = Some("PT".into()));
-        add(&|search| search.rest_or_stress = Some(RestOrStress::Stress));
+        add(&|search| search.rest_or_stress = Some(WhichScan::Stress));
         add(&|search| search.patient = Some("77".into()));
         add(&|search| search.study_date_from = Some("20260601".into()));
         add(&|search| search.study_date_to = Some("20260601".into()));
         add(&|search| {
             search.words = words("smith", true);
             search.made = Some(MadeOfScan::Nothing);
-            search.rest_or_stress = Some(RestOrStress::Rest);
+            search.rest_or_stress = Some(WhichScan::Rest);
         });
     }
     searches

@@ -1,7 +1,7 @@
 // How the slices of a comparison are shown: window, normalisation, zoom, and the rows.
 
 import { useWatched } from "../state";
-import { KINDS, type Row, SLICE_MM, STANDARD_ROWS } from "./compared";
+import { KINDS, type Row } from "./compared";
 import type { ComparedScene, Normalisation } from "./comparedscene";
 import { ColourBar } from "./wall";
 
@@ -165,16 +165,7 @@ export function RowsOfSlices({ scene }: { scene: ComparedScene }) {
         most={60}
         onNumber={value => scene.changeRow({ restShift: value })}
       />
-      <button
-        type="button"
-        class="plain"
-        onClick={() => {
-          scene.window.value = [0, 100];
-          scene.normalisation.value = "wall";
-          scene.across.value = SLICE_MM;
-          scene.rows.value = STANDARD_ROWS;
-          scene.chosen.value = { kind, number: Math.min(scene.chosen.value.number, STANDARD_ROWS[kind]!.count - 1) };
-        }}>
+      <button type="button" class="plain" onClick={() => scene.showAsAtFirst()}>
         As at first
       </button>
     </div>

@@ -52,9 +52,23 @@ export class ComparedScene {
 
   /** Changes the row of the marked slice, which stays within it. */
   changeRow(change: Partial<Row>): void {
+    const { kind } = this.chosen.value;
+    this.showRows(this.rows.value.map((row, at) => (at === kind ? { ...row, ...change } : row)));
+  }
+
+  /** Window, zoom and rows as they were at first. */
+  showAsAtFirst(): void {
+    const first = new ComparedScene();
+    this.window.value = first.window.value;
+    this.normalisation.value = first.normalisation.value;
+    this.across.value = first.across.value;
+    this.showRows(first.rows.value);
+  }
+
+  private showRows(rows: Row[]): void {
     const { kind, number } = this.chosen.value;
-    this.rows.value = this.rows.value.map((row, at) => (at === kind ? { ...row, ...change } : row));
-    const last = this.rows.value[kind]!.count - 1;
+    this.rows.value = rows;
+    const last = rows[kind]!.count - 1;
     if (number > last) this.chosen.value = { kind, number: last };
   }
 }

@@ -595,24 +595,22 @@ impl Attributes {
         self.texts_of(attribute, None)
     }
 
+    /// Where values of item number `item`, from 0, are kept; `None` if that item does not state the attribute.
+    fn kept_item(&self, attribute: Attribute, item: usize) -> Option<Option<usize>> {
+        let kept = (item > 0).then_some(item);
+        self.states(attribute, kept).then_some(kept)
+    }
+
     /// As [`Attributes::texts`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
     pub fn texts_of_item(&self, attribute: Attribute, item: usize) -> Vec<String> {
-        let item = (item > 0).then_some(item);
-        if self.states(attribute, item) {
-            self.texts_of(attribute, item)
-        } else {
-            Vec::new()
-        }
+        let kept = self.kept_item(attribute, item);
+        kept.map_or_else(Vec::new, |item| self.texts_of(attribute, item))
     }
 
     /// As [`Attributes::shorts`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
     pub fn shorts_of_item(&self, attribute: Attribute, item: usize) -> Vec<u16> {
-        let item = (item > 0).then_some(item);
-        if self.states(attribute, item) {
-            self.shorts_of(attribute, item)
-        } else {
-            Vec::new()
-        }
+        let kept = self.kept_item(attribute, item);
+        kept.map_or_else(Vec::new, |item| self.shorts_of(attribute, item))
     }
 
     /// As [`Attributes::decimals`], of item number `item`, from 0, of the detectors, rotations or energy windows alone.
@@ -624,12 +622,8 @@ impl Attributes {
         attribute: Attribute,
         item: usize,
     ) -> Result<Option<[f64; N]>, ReadError> {
-        let item = (item > 0).then_some(item);
-        if self.states(attribute, item) {
-            self.decimals_of(attribute, item)
-        } else {
-            Ok(None)
-        }
+        let kept = self.kept_item(attribute, item);
+        kept.map_or(Ok(None), |item| self.decimals_of(attribute, item))
     }
 
     /// As [`Attributes::texts`], for stored frame number `frame`, from 0.

@@ -82,25 +82,13 @@ impl FrameOrder {
         }
         let slices = counts.pop().unwrap_or(1);
         let gating = <[usize; 2]>::try_from(counts).unwrap_or([1, 1]);
-        let mut stored = vec![None; if cells == frames { cells } else { 0 }];
-        let mut alike = None;
-        for (frame, &cell) in index.iter().enumerate() {
-            match stored.get_mut(cell) {
-                Some(place @ None) => *place = Some(frame),
-                Some(Some(first)) => {
-                    alike.get_or_insert((*first + 1, frame + 1));
-                }
-                None => {}
-            }
-        }
-        let complete: Option<Vec<usize>> = stored.into_iter().collect();
-        match complete.filter(|all| all.len() == frames) {
-            Some(stored) => Ok(Self {
+        match frame_of_each(&index, cells) {
+            Ok(stored) => Ok(Self {
                 slices,
                 gating,
                 stored,
             }),
-            None => {
+            Err(alike) => {
                 let alike = match alike {
                     Some((first, second)) => {
                         format!("; frames {first} and {second} have the same numbers")
@@ -137,6 +125,30 @@ impl FrameOrder {
     pub fn slices_of(&self, gate: usize) -> &[usize] {
         &self.stored[gate * self.slices..(gate + 1) * self.slices]
     }
+}
+
+/// The stored frame of each of so many `cells`, of frames that lie in the cells `index`.
+///
+/// # Errors
+/// Unless each cell has exactly one frame: the numbers, from 1, of the first two frames of one cell, if any has two.
+pub(super) fn frame_of_each(
+    index: &[usize],
+    cells: usize,
+) -> Result<Vec<usize>, Option<(usize, usize)>> {
+    let frames = index.len();
+    let mut stored = vec![None; if cells == frames { cells } else { 0 }];
+    let mut alike = None;
+    for (frame, &cell) in index.iter().enumerate() {
+        match stored.get_mut(cell) {
+            Some(place @ None) => *place = Some(frame),
+            Some(Some(first)) => {
+                alike.get_or_insert((*first + 1, frame + 1));
+            }
+            None => {}
+        }
+    }
+    let complete: Option<Vec<usize>> = stored.into_iter().collect();
+    complete.filter(|all| all.len() == frames).ok_or(alike)
 }
 
 /// Checks that the Frame Increment Pointer, if present, names none but `vectors`. Some writers name further

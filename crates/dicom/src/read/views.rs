@@ -16,7 +16,7 @@ use super::attributes::{
     ENERGY_WINDOWS, ROTATION_VECTOR, ROTATIONS, RR_INTERVAL_VECTOR, RR_INTERVALS, TIME_SLOT_VECTOR,
     TIME_SLOTS,
 };
-use super::frames::check_pointer;
+use super::frames::{check_pointer, frame_of_each};
 
 /// The vectors, the slowest first, each with the attribute that states its greatest number.
 const VECTORS: [(Attribute, Option<Attribute>); 6] = [
@@ -135,24 +135,11 @@ fn each_once(
     cells: usize,
     counts: [usize; VECTORS.len()],
 ) -> Result<Vec<usize>, ReadError> {
-    let frames = index.len();
-    let mut stored = vec![None; if cells == frames { cells } else { 0 }];
-    let mut alike = String::new();
-    for (frame, cell) in index.iter().enumerate() {
-        match stored.get_mut(*cell) {
-            Some(place @ None) => *place = Some(frame),
-            Some(Some(first)) if alike.is_empty() => {
-                alike = format!(
-                    "; frames {} and {} have the same numbers",
-                    *first + 1,
-                    frame + 1
-                );
-            }
-            _ => {}
-        }
-    }
-    let complete: Option<Vec<usize>> = stored.into_iter().collect();
-    complete.filter(|all| all.len() == frames).ok_or_else(|| {
+    frame_of_each(index, cells).map_err(|alike| {
+        let frames = index.len();
+        let alike = alike.map_or(String::new(), |(first, second)| {
+            format!("; frames {first} and {second} have the same numbers")
+        });
         let [windows, detectors, rotations, intervals, slots, views] = counts;
         a.wrong(
             ANGULAR_VIEW_VECTOR.name,

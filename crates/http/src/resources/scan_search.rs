@@ -8,7 +8,7 @@ use crate::edge::caller::Caller;
 use crate::resources::scans::{VALUE_LENGTH, is_value, sees_patients};
 use crate::wire::problem::Answer;
 use crate::wire::query::{Moment, parsed};
-use crate::wire::words::{JobOnScanName, MadeOfScanName, RestOrStressName, ScanOrderName};
+use crate::wire::words::{JobOnScanName, MadeOfScanName, ScanOrderName, WhichScanName};
 use serde::{Deserialize, Deserializer};
 use utoipa::IntoParams;
 use ventriform::base::text::is_printable;
@@ -46,7 +46,7 @@ pub struct ScanListQuery {
     modality: Option<String>,
     /// Only volumes of scans at rest, or at stress
     #[param(inline)]
-    rest_or_stress: Option<RestOrStressName>,
+    rest_or_stress: Option<WhichScanName>,
     /// Only volumes with this Patient ID; not for the scope `read`
     #[serde(default, deserialize_with = "value")]
     #[param(value_type = Option<String>, pattern = "^.{1,64}$")]

@@ -7,12 +7,11 @@ use std::borrow::Cow;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::{PartialSchema, ToSchema};
+use ventriform::heart::comparison::WhichScan;
 use ventriform::heart::model::Organ;
 use ventriform::mesh::files::{MeshFrame, MeshUnit};
 use ventriform::results::export::Part;
-use ventriform_service::base::records::{
-    JobOnScan, JobState, MadeOfScan, Priority, RestOrStress, ScanOrder,
-};
+use ventriform_service::base::records::{JobOnScan, JobState, MadeOfScan, Priority, ScanOrder};
 use ventriform_service::callers::Scope;
 use ventriform_service::network::hooks::HookEvent;
 use ventriform_service::network::intake::GroupState;
@@ -63,9 +62,9 @@ named! {
     Organ, OrganName, "Organ", None;
     Part, PartName, "Part", None;
     Priority, PriorityName, "Priority", Some("How urgent a job is.");
-    RestOrStress, RestOrStressName, "RestOrStress", None;
     ScanOrder, ScanOrderName, "ScanOrder", None;
     Scope, ScopeName, "Scope", Some("What a key allows.");
+    WhichScan, WhichScanName, "WhichScan", None;
 }
 
 fn words<T: Named>() -> impl Iterator<Item = &'static str> {

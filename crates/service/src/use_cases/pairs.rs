@@ -169,7 +169,7 @@ fn roles_of(scans: &[&ScanIdentity], rule: &Rule) -> Vec<Option<WhichScan>> {
         let is_told = told_of(first, role) || told_of(second, other);
         is_told && !told_of(first, other) && !told_of(second, role)
     };
-    let none_told = [WhichScan::Stress, WhichScan::Rest]
+    let none_told = WhichScan::ALL
         .iter()
         .all(|role| !told_of(first, *role) && !told_of(second, *role));
     let of_first = if may_be(WhichScan::Stress) {

@@ -358,7 +358,7 @@ mod tests {
     use super::*;
     use crate::space::DiskGauge;
     use std::time::Duration;
-    use ventriform_service::base::records::{RestOrStress, ScanFilter};
+    use ventriform_service::base::records::{ScanFilter, WhichScan};
 
     #[test]
     fn a_word_is_looked_for_in_the_forms_in_which_names_are_written() {
@@ -412,7 +412,7 @@ mod tests {
             (with(|s| s.made = Some(MadeOfScan::Beat)), None),
             (with(|s| s.made = Some(MadeOfScan::Nothing)), None),
             (with(|s| s.modality = Some("NM".into())), None),
-            (with(|s| s.rest_or_stress = Some(RestOrStress::Rest)), None),
+            (with(|s| s.rest_or_stress = Some(WhichScan::Rest)), None),
             (with(|s| s.patient = Some("7".into())), None),
             (with(|s| s.created_after = Some(3)), None),
             (with(|s| s.job = Some(JobOnScan::Failed)), Some("volume=?")),

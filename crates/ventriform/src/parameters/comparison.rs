@@ -352,7 +352,7 @@ mod tests {
             ("segments_from", "0,1,0"),
         ];
         let fit = FitParameters::from_pairs(corrected).unwrap();
-        for scan in [WhichScan::Stress, WhichScan::Rest] {
+        for scan in WhichScan::ALL {
             let given = ComparisonChoice::corrections_of(&fit.to_json(), scan);
             assert_eq!(given.len(), corrected.len());
             let read = ComparisonParameters::from_json(&given).unwrap();

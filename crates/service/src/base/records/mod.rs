@@ -73,7 +73,7 @@ pub use scan_erasure::{
     SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
 };
 pub use scan_lists::{FoundScans, Receiving, ScanLists};
-pub use scan_search::{JobOnScan, MadeOfScan, RestOrStress, ScanOrder, ScanSearch, SearchedWords};
+pub use scan_search::{JobOnScan, MadeOfScan, ScanOrder, ScanSearch, SearchedWords, WhichScan};
 pub use service_clock::{DOUBT_LASTS, ServiceClock};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};

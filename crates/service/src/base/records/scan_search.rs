@@ -2,6 +2,7 @@
 
 use super::Timestamp;
 use std::fmt;
+pub use ventriform::heart::comparison::WhichScan;
 
 /// The order of a list of scans.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -105,28 +106,6 @@ impl JobOnScan {
     }
 }
 
-/// What a scan was made at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RestOrStress {
-    /// At rest.
-    Rest,
-    /// At stress.
-    Stress,
-}
-
-impl RestOrStress {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Rest, Self::Stress];
-
-    /// Its name.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Rest => "rest",
-            Self::Stress => "stress",
-        }
-    }
-}
-
 /// Words that are looked for. They may be names of patients: `Debug` shows none of them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct SearchedWords {
@@ -160,7 +139,7 @@ pub struct ScanSearch {
     /// Only those of this modality, as headers write it.
     pub modality: Option<String>,
     /// Only those made at rest, or at stress.
-    pub rest_or_stress: Option<RestOrStress>,
+    pub rest_or_stress: Option<WhichScan>,
     /// Only those with this Patient ID.
     pub patient: Option<String>,
     /// Only those with a Study Date from this one on, `YYYYMMDD`.

@@ -15,6 +15,9 @@ pub enum WhichScan {
 }
 
 impl WhichScan {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Stress, Self::Rest];
+
     /// `stress` or `rest`.
     pub fn as_str(self) -> &'static str {
         match self {

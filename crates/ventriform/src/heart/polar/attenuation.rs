@@ -7,11 +7,11 @@
 use super::document::{PolarAttenuation, PolarSummary, round};
 
 impl PolarSummary {
-    /// The summary with a note on attenuation, if the map has sides, attenuation was not `corrected` for sure, and
-    /// inferior wall lies below the threshold.
+    /// The summary with a note on attenuation, if no normal `limits` stand beside the map, it has sides, attenuation was
+    /// not `corrected` for sure, and inferior wall lies below the threshold.
     #[must_use]
-    pub fn with_attenuation(self, corrected: Option<bool>) -> Self {
-        let attenuation = self.attenuation_of(corrected);
+    pub fn with_attenuation(self, corrected: Option<bool>, limits: bool) -> Self {
+        let attenuation = self.attenuation_of(corrected).filter(|_| !limits);
         Self {
             attenuation,
             ..self

@@ -619,7 +619,12 @@ pub(crate) mod tests {
         for segment in &mut summary.segments {
             segment.extent_percent = if segment.number == 4 { 40.0 } else { 10.0 };
         }
-        let told = |corrected| summary.clone().with_attenuation(corrected).attenuation;
+        let told = |corrected| {
+            summary
+                .clone()
+                .with_attenuation(corrected, false)
+                .attenuation
+        };
         // The mean over all of the wall, of which segments 3, 4, 5, 9, 10, 11 and 15 have inferior in their names.
         let area = |numbers: &[usize]| -> f64 {
             let of = summary
@@ -643,9 +648,9 @@ pub(crate) mod tests {
         for segment in &mut even.segments {
             segment.extent_percent = 0.0;
         }
-        assert_eq!(even.with_attenuation(None).attenuation, None);
+        assert_eq!(even.with_attenuation(None, false).attenuation, None);
         let unknown = PolarSummary::from_map(&map.counted_by(OrientationSource::Unknown));
-        assert_eq!(unknown.with_attenuation(None).attenuation, None);
+        assert_eq!(unknown.with_attenuation(None, false).attenuation, None);
     }
 
     #[test]

@@ -20,9 +20,11 @@ use crate::mesh::shapes;
 /// Spacing of the places where hollow balls are tried, mm.
 const SEARCH_STRIDE_MM: f64 = 8.0;
 /// Radii of the balls' shells, mm: those of the middle of the wall.
-const BALL_RADII_MM: [f64; 3] = [22.0, 27.0, 33.0];
-/// Radius of the ball for hearts of 300 ml and more, mm.
-const LARGEST_BALL_RADIUS_MM: f64 = 42.0;
+const RADII_MM: [f64; 3] = [22.0, 27.0, 33.0];
+/// The same with a ball for hearts of 300 ml and more, mm.
+const RADII_WITH_VERY_LARGE_MM: [f64; 4] = [22.0, 27.0, 33.0, 42.0];
+/// Distance of a ball's outer samples from its shell, mm.
+const OUTSIDE_MM: f64 = 17.0;
 /// Most places returned.
 const MAX_CANDIDATES: usize = 60;
 /// Balls whose shell is darker than this share of the brightest value are left out.
@@ -38,10 +40,14 @@ pub fn places(
     brightest: f64,
     monitor: &Monitor,
 ) -> Result<Vec<Vec3>, Cancelled> {
-    let padded = Padded::new(field);
-    let very_large = hints.infarcted.then_some(LARGEST_BALL_RADIUS_MM);
-    let balls: Vec<Ball> = (BALL_RADII_MM.into_iter().chain(very_large))
-        .map(|radius| Ball::new(radius, field, &padded))
+    let radii: &[f64] = match hints.infarcted {
+        true => &RADII_WITH_VERY_LARGE_MM,
+        false => &RADII_MM,
+    };
+    let largest = radii.iter().copied().fold(0.0, f64::max);
+    let padded = Padded::new(field, largest);
+    let balls: Vec<Ball> = (radii.iter())
+        .map(|radius| Ball::new(*radius, field, &padded))
         .collect();
     let [nx, ny, nz] = field.shape();
     let mut scores = vec![f32::NEG_INFINITY; nx * ny * nz];
@@ -118,14 +124,12 @@ struct Padded {
     values: Vec<f32>,
 }
 
-/// The largest ball's outer samples, mm.
-const MAX_BALL_RADIUS_MM: f64 = LARGEST_BALL_RADIUS_MM + 17.0;
-
 impl Padded {
-    fn new(field: &Field) -> Self {
+    /// `field` with room for balls whose shells have radii of up to `largest` mm.
+    fn new(field: &Field, largest: f64) -> Self {
         let inner = field.shape();
-        let margin =
-            [0, 1, 2].map(|a| (MAX_BALL_RADIUS_MM / field.spacing()[a] * 1.5).ceil() as usize + 1);
+        let reach = largest + OUTSIDE_MM;
+        let margin = [0, 1, 2].map(|a| (reach / field.spacing()[a] * 1.5).ceil() as usize + 1);
         let shape = [0, 1, 2].map(|a| inner[a] + 2 * margin[a]);
         let clamped = |x: usize, a: usize| x.saturating_sub(margin[a]).min(inner[a] - 1);
         let mut values = Vec::with_capacity(shape.iter().product());
@@ -179,7 +183,7 @@ impl Ball {
             groups: [
                 shell(&directions, radius),
                 hollow,
-                shell(&directions, radius + 17.0),
+                shell(&directions, radius + OUTSIDE_MM),
             ],
         }
     }
@@ -305,7 +309,7 @@ mod tests {
         let scan = phantom(&parameters, &Monitor::silent()).expect("a usual phantom");
         let mut field = Field::coarse(&scan.volume, None, 5.0, &Monitor::silent()).unwrap();
         field.blur(4.0, &Monitor::silent()).unwrap();
-        let padded = Padded::new(&field);
+        let padded = Padded::new(&field, 33.0);
         let balls = [22.0, 33.0].map(|radius| Ball::new(radius, &field, &padded));
         let least = (MIN_SHELL_SHARE as f32) * field.values().iter().fold(0f32, |a, b| a.max(*b));
         let mut row = Row::default();

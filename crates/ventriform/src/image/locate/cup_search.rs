@@ -255,7 +255,7 @@ impl<'a> CupSearch<'a> {
 }
 
 /// The walls that infarcts leave: each of `found` again, moved, turned and scaled until it agrees best with a
-/// ventricle of which an arc takes up next to nothing. In no particular order.
+/// ventricle of which an arc takes up next to nothing. Best first.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -297,7 +297,9 @@ pub fn infarcted(
                 .collect())
         })
         .collect::<Result<_, Cancelled>>()?;
-    Ok(climbed.concat())
+    let mut found = climbed.concat();
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    Ok(found)
 }
 
 /// The axis directions that are tried.

@@ -120,8 +120,7 @@ impl Cups {
     /// # Errors
     /// [`LocateError::Cancelled`].
     pub fn infarcted(self, monitor: &Monitor) -> Result<Self, LocateError> {
-        let mut found = cup_search::infarcted(&self.field, &self.hints, &self.found, monitor)?;
-        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let found = cup_search::infarcted(&self.field, &self.hints, &self.found, monitor)?;
         Ok(Self { found, ..self })
     }
 

@@ -107,35 +107,10 @@ pub fn find<'v>(
 ) -> Result<Heart<'v>, LocateError> {
     hot_voxels::check(volume)?;
     let rays = RaySearch::new(volume, monitor)?;
-    if hints.infarcted {
-        let cups = Cups::everywhere(volume, hints, monitor)?.infarcted(monitor)?;
-        let decision = by_cups(cups)?;
-        return Ok(Heart {
-            volume,
-            hints: hints.clone(),
-            rays,
-            decision,
-        });
-    }
-    let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
-    let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
-    let clear = match &proposal {
-        Some(cavity) => clear_cup(volume, hints, cavity, monitor)?,
-        None => None,
-    };
-    let decision = match (proposal, clear) {
-        (Some(cavity), Some(cup)) => Decision::Rays(cavity, Box::new(cup)),
-        _ => {
-            let mut cups = Cups::everywhere(volume, hints, monitor)?;
-            if cups.clear_score().is_none() {
-                match below_hot_organs(volume, cups.brightest(), hints, monitor)? {
-                    Some(clear) => cups = clear,
-                    None if hints.centre.is_some() => cups.add_infarcted(monitor)?,
-                    None => {}
-                }
-            }
-            by_cups(cups)?
-        }
+    let decision = if hints.infarcted {
+        by_cups(Cups::everywhere(volume, hints, monitor)?.infarcted(monitor)?)?
+    } else {
+        usual(volume, hints, &rays, monitor)?
     };
     Ok(Heart {
         volume,
@@ -143,6 +118,36 @@ pub fn find<'v>(
         rays,
         decision,
     })
+}
+
+/// The decision by rays and cups, and by what is tried where these are not sure.
+///
+/// # Errors
+/// As [`find`].
+fn usual(
+    volume: &Volume,
+    hints: &Hints,
+    rays: &RaySearch<'_>,
+    monitor: &Monitor,
+) -> Result<Decision, LocateError> {
+    let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
+    let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
+    let clear = match &proposal {
+        Some(cavity) => clear_cup(volume, hints, cavity, monitor)?,
+        None => None,
+    };
+    if let (Some(cavity), Some(cup)) = (proposal, clear) {
+        return Ok(Decision::Rays(cavity, Box::new(cup)));
+    }
+    let mut cups = Cups::everywhere(volume, hints, monitor)?;
+    if cups.clear_score().is_none() {
+        match below_hot_organs(volume, cups.brightest(), hints, monitor)? {
+            Some(clear) => cups = clear,
+            None if hints.centre.is_some() => cups.add_infarcted(monitor)?,
+            None => {}
+        }
+    }
+    by_cups(cups)
 }
 
 /// The decision by the best of `cups`.

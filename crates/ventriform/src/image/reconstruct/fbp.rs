@@ -19,11 +19,14 @@ pub(super) fn image(
     monitor: &Monitor,
 ) -> Result<Vec<f32>, Cancelled> {
     let views = projections.views.len();
+    // Zeros beside a frame keep one side out of the other's way.
+    let across = Axis::padded(projections.columns, 2 * projections.columns);
+    let ramp = ramp(across.length());
     let filtered: Vec<Result<Vec<f32>, Cancelled>> = (0..views)
         .into_par_iter()
         .map(|view| {
             monitor.check()?;
-            Ok(ramped(projections, view, how))
+            Ok(ramped(projections, view, across, &ramp, how))
         })
         .collect();
     let filtered: Vec<Vec<f32>> = filtered.into_iter().collect::<Result<_, _>>()?;
@@ -49,12 +52,14 @@ pub(super) fn image(
 }
 
 /// The frame of a view with the ramp's and the filter's share of each frequency.
-fn ramped(projections: &Projections, view: usize, how: &Reconstruction) -> Vec<f32> {
-    let (columns, rows) = (projections.columns, projections.rows);
-    // Zeros beside the frame keep one side out of the other's way.
-    let across = Axis::padded(columns, 2 * columns);
-    let along = Axis::mirrored(rows);
-    let ramp = ramp(across.length());
+fn ramped(
+    projections: &Projections,
+    view: usize,
+    across: Axis,
+    ramp: &[f64],
+    how: &Reconstruction,
+) -> Vec<f32> {
+    let along = Axis::mirrored(projections.rows);
     let pixel_cm = projections.pixel_mm / 10.0;
     let gain = |[u, z, _]: [usize; 3]| {
         let across_per_cm = frequency_per_cm(u, across.length(), pixel_cm);

@@ -25,10 +25,7 @@ fn scan_report(heart: &ComparedHeart, scores: Option<[Answer; 2]>) -> ComparedSc
     let facts = heart.facts();
     let attenuation_corrected = scan.and_then(Provenance::attenuation_corrected);
     let limits = heart.perfusion().is_some();
-    let summary = |map| match PolarSummary::from_map(map) {
-        summary if limits => summary,
-        summary => summary.with_attenuation(attenuation_corrected),
-    };
+    let summary = |map| PolarSummary::from_map(map).with_attenuation(attenuation_corrected, limits);
     ComparedScan {
         template: heart.template().to_owned(),
         confidence: round(segmentation.fit.judgement.confidence),

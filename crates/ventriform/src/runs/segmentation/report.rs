@@ -49,13 +49,10 @@ impl SegmentedVolume {
 
     /// The map's summary, with a note on attenuation where no normal limits stand beside it.
     fn polar_summary(&self, map: &PolarMap) -> PolarSummary {
-        let summary = PolarSummary::from_map(map);
-        if self.perfusion.is_some() {
-            return summary;
-        }
         let stated = self.parameters.scan.attenuation_corrected;
         let header = self.reading.provenance.as_ref();
-        summary.with_attenuation(stated.or_else(|| header?.attenuation_corrected()))
+        let corrected = stated.or_else(|| header?.attenuation_corrected());
+        PolarSummary::from_map(map).with_attenuation(corrected, self.perfusion.is_some())
     }
 }
 

@@ -427,11 +427,11 @@ impl DicomFile {
                     let (voxels, own) = raw.volume(&self.parts[0], &[volume], false, &part)?;
                     tally.add_portion(&voxels);
                     take(0, &voxels);
-                    warnings.extend(
-                        own.into_iter()
-                            .filter(|own| !warnings.contains(own))
-                            .collect::<Vec<_>>(),
-                    );
+                    for warning in own {
+                        if !warnings.contains(&warning) {
+                            warnings.push(warning);
+                        }
+                    }
                 }
                 Ok((tally, warnings))
             }
