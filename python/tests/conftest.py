@@ -80,6 +80,21 @@ def gated(folder: pathlib.Path) -> pathlib.Path:
 
 
 @pytest.fixture(scope="session")
+def raw(folder: pathlib.Path) -> pathlib.Path:
+    """Projections of the scan."""
+    import sys
+
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import nibabel
+
+    from lib.nm import projections  # type: ignore[import-not-found]
+
+    image = nibabel.as_closest_canonical(nibabel.load(folder / "rest/spect.nii.gz"))
+    projections(folder / "raw.dcm", image.get_fdata()[::-1, ::-1], 6.4, 1)
+    return folder / "raw.dcm"
+
+
+@pytest.fixture(scope="session")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """The address of a service of its own."""
     folder = tmp_path_factory.mktemp("service")

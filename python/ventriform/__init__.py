@@ -5,10 +5,10 @@
 >>> fit = vf.segment(scan)
 >>> fit.mask, fit.confidence, fit.polar
 
-Functions: `read`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`, `evaluate`,
-`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in
-the patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`. `Coordinates`
-state theirs. Files are LPS, as the command writes them.
+Functions: `read`, `reconstruct`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`,
+`evaluate`, `phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are
+millimetres in the patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`.
+`Coordinates` state theirs. Files are LPS, as the command writes them.
 
 Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is
 a client of the service (extra `client`).
@@ -32,7 +32,19 @@ from ._errors import (
     VentriformError,
 )
 from ._frames import Coordinates
-from ._functions import beat, build_normals, calibrate, compare, evaluate, generate, measure, phantom, read, segment
+from ._functions import (
+    beat,
+    build_normals,
+    calibrate,
+    compare,
+    evaluate,
+    generate,
+    measure,
+    phantom,
+    read,
+    reconstruct,
+    segment,
+)
 from ._native import __version__
 from ._results import (
     Beat,
@@ -96,6 +108,7 @@ __all__ = [
     "phantom",
     "plot",
     "read",
+    "reconstruct",
     "reports",
     "segment",
 ]

@@ -74,6 +74,40 @@ def read(source: Any, *, frame: str = "RAS", threads: int | None = None) -> Volu
     return Volume._of(native, kept, _kept(source), stamps)
 
 
+@with_table("reconstruct")
+def reconstruct(
+    raw: Any, *, sum_gates: bool = False, progress: Any = None, threads: int | None = None, **parameters: Any
+) -> Volume:
+    """Reconstructs the projections of a gamma camera, as `ventriform reconstruct`.
+
+    Parameters
+    ----------
+    raw : Volume, path, bytes or dataset
+        A DICOM NM image of the Image Type TOMO or GATED TOMO, as `read` takes it.
+    sum_gates : bool
+        One volume of the counts of all gates.
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
+    [parameters]
+
+    Returns
+    -------
+    Volume
+        With a volume for each gate, unless they are summed.
+
+    Raises
+    ------
+    InputError
+        If there are no projections, they contradict themselves, or a parameter cannot be used.
+    """
+    frame = frame_of(raw)
+    native = _inputs.native(raw, unwrap)
+    made = _native.reconstruct(native, parameters, sum_gates, _how(progress, threads))
+    return Volume._of(made, frame, None, [])
+
+
 @with_table("generate")
 def generate(scan: Any, *, progress: Any = None, threads: int | None = None, **parameters: Any) -> Model:
     """Makes a surface model of a volume, as `ventriform generate`.

@@ -28,6 +28,10 @@ target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed
 "$PYTHON" scripts/check/dicom.py target/debug/ventriform "$out" "$@"
 "$PYTHON" scripts/check/names.py target/debug/ventriform "$out/names"
 
+mkdir -p "$out/raw/out"
+target/debug/ventriform phantom -o "$out/raw/out" --size 64 --spacing 6.4 --projections --heads 2 2>/dev/null
+target/debug/ventriform reconstruct "$out/raw/out/raw.dcm" -o "$out/raw/out/slices.dcm" 2>/dev/null
+
 wrong=0
 for file in "$out"/*/out/*.dcm; do
   dcmdump -q "$file" >/dev/null || { echo "dcmdump cannot read $file" && wrong=1; }

@@ -7,9 +7,11 @@ In numpy: OSEM, 3 iterations over the greatest number of subsets up to 10 that d
 interpolation between voxels and between pixels, then a Butterworth filter of 0.5 cycles per cm and order 5 by the
 spectrum of the whole volume. Of angles and directions it knows the words of PS3.3 C.8.4.11 alone. Out: the difference
 over the scan's size, and where the brightest spot lies in both. Needs nibabel and pydicom. Exits with 1 if it is more
-than 2 %, or more than a voxel apart.
+than 2 %, or more than a voxel apart; if the slices as DICOM differ from those as NIfTI; or if a step of the patient is
+not told and corrected.
 """
 
+import json
 import pathlib
 import subprocess
 import sys
@@ -18,9 +20,6 @@ import tempfile
 import nibabel
 import numpy as np
 import pydicom
-
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
-from lib.nm import projections
 
 ITERATIONS, MOST_SUBSETS, CUT_OFF_PER_CM, ORDER = 3, 10, 0.5, 5
 MOST_DIFFERENCE = 0.02
@@ -92,12 +91,58 @@ def butterworth(image, mm):
 
 def simulated(folder, program):
     """Projections of a simulated scan."""
-    flags = ["--size", "64", "--spacing", "6.4", "--noise", "0"]
+    flags = ["--size", "64", "--spacing", "6.4", "--projections"]
     subprocess.run([program, "phantom", "-o", folder / "scan", *flags], check=True)
-    image = nibabel.as_closest_canonical(nibabel.load(folder / "scan/spect.nii.gz"))
-    path = folder / "raw.dcm"
-    projections(path, image.get_fdata()[::-1, ::-1], 6.4, 1)
-    return path
+    return folder / "scan/raw.dcm"
+
+
+def two_heads(folder, program):
+    """Two heads count what one does, and a step is told of both at its time."""
+    flags = ["--size", "64", "--spacing", "6.4", "--projections", "--heads", "2", "--motion", "-10"]
+    subprocess.run([program, "phantom", "-o", folder / "two", *flags], check=True)
+    subprocess.run([program, "segment", folder / "two/raw.dcm", "-o", folder / "two/out"], check=True)
+    moves = json.loads((folder / "two/out/report.json").read_text())["projections"]["moves"]
+    print(f"two heads: {moves}")
+    return len(moves) == 1 and moves[0]["from_time"] in (15, 16, 17) and abs(moves[0]["head_mm"] + 10) < 3
+
+
+def moved(folder, program, raw, mm=12.0):
+    """A step of `mm` towards the head half-way through the scan is told, and goes by `--correct-motion`."""
+    data = pydicom.dcmread(raw)
+    frames = data.pixel_array.astype(float)
+    away, size = len(frames) // 2, float(data.PixelSpacing[0])
+    rows = np.arange(frames.shape[1]) + mm / size
+    for frame in frames[away:]:
+        for column in frame.T:
+            column[:] = np.interp(rows, np.arange(len(column)), column.copy())
+    data.PixelData = np.round(frames).astype(np.uint16).tobytes()
+    path = folder / "moved.dcm"
+    data.save_as(path)
+    reports = {}
+    for name, flags in (("as it is", []), ("corrected", ["--correct-motion"])):
+        out = folder / name
+        subprocess.run([program, "segment", path, "-o", out, *flags], check=True)
+        reports[name] = json.loads((out / "report.json").read_text())
+    told = reports["as it is"]["projections"]
+    steps = [own for own in told["moves"] if abs(own["from_time"] - 1 - away) <= 1 and abs(own["head_mm"] - mm) < 3]
+    after = reports["corrected"]["projections"]["uncorrected"]
+    print(f"moves {told['moves']}, before the correction: {after and after['confidence']}")
+    return len(steps) == 1 and after is not None and len(after["segments_change"]) == 17
+
+
+def slices(folder, program, raw):
+    """The slices as DICOM have the voxels, place and patient of those as NIfTI."""
+    paths = [folder / "slices.dcm", folder / "slices.nii.gz"]
+    for path in paths:
+        subprocess.run([program, "reconstruct", raw, "-o", path, "--sum"], check=True)
+    image, known = pydicom.dcmread(paths[0]), nibabel.as_closest_canonical(nibabel.load(paths[1]))
+    known = known.get_fdata()[::-1, ::-1].transpose(2, 1, 0)
+    scale = image.RealWorldValueMappingSequence[0].RealWorldValueSlope
+    position = image.DetectorInformationSequence[0].ImagePositionPatient
+    difference = np.abs(image.pixel_array * scale - known).max() / known.max()
+    same = image.StudyInstanceUID == pydicom.dcmread(raw).StudyInstanceUID
+    print(f"slices as DICOM differ by {difference:.1e}, first voxel at {position}")
+    return difference < 1e-4 and same and image.ImageType[2] == "RECON TOMO"
 
 
 def main(program, raw=None):
@@ -114,7 +159,9 @@ def main(program, raw=None):
         spots = [np.unravel_index(volume.argmax(), volume.shape) for volume in (made, known)]
         apart = np.abs(np.subtract(*spots)).max()
         print(f"difference {100 * difference:.2f} %, brightest voxels {apart} apart")
-        return int(difference > MOST_DIFFERENCE or apart > 1)
+        close = difference <= MOST_DIFFERENCE and apart <= 1
+        checks = [close, slices(folder, program, raw), moved(folder, program, raw), two_heads(folder, program)]
+        return int(not all(checks))
 
 
 if __name__ == "__main__":

@@ -111,7 +111,7 @@ impl DicomArgs {
             deidentify: self.deidentify.then(|| Deidentification {
                 secret: self.secret(),
             }),
-            made: self.moment()?,
+            made: moment(self.made_at.as_deref())?,
         };
         let made = order(&choice).map_err(|error| anyhow!(error.with_advice()))?;
         Ok(Some(made))
@@ -188,25 +188,25 @@ impl DicomArgs {
             frame_of_reference_uid: self.frame_of_reference_uid.clone(),
         }
     }
+}
 
-    /// The time of the objects, in UTC.
-    fn moment(&self) -> Result<Moment> {
-        let time = match &self.made_at {
-            None => OffsetDateTime::now_utc(),
-            Some(text) => OffsetDateTime::parse(text, &Rfc3339).map_err(|_| {
-                anyhow!("--made-at {text:?} is no time; give one such as 2026-11-23T13:45:00Z")
-            })?,
-        };
-        let time = time.to_offset(UtcOffset::UTC);
-        let (hour, minute, second) = time.to_hms();
-        Ok(Moment {
-            date: format!(
-                "{:04}{:02}{:02}",
-                time.year(),
-                u8::from(time.month()),
-                time.day()
-            ),
-            time: format!("{hour:02}{minute:02}{second:02}"),
-        })
-    }
+/// The time of objects that `--made-at` states, or now, in UTC.
+pub(super) fn moment(made_at: Option<&str>) -> Result<Moment> {
+    let time = match made_at {
+        None => OffsetDateTime::now_utc(),
+        Some(text) => OffsetDateTime::parse(text, &Rfc3339).map_err(|_| {
+            anyhow!("--made-at {text:?} is no time; give one such as 2026-11-23T13:45:00Z")
+        })?,
+    };
+    let time = time.to_offset(UtcOffset::UTC);
+    let (hour, minute, second) = time.to_hms();
+    Ok(Moment {
+        date: format!(
+            "{:04}{:02}{:02}",
+            time.year(),
+            u8::from(time.month()),
+            time.day()
+        ),
+        time: format!("{hour:02}{minute:02}{second:02}"),
+    })
 }

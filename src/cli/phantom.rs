@@ -5,12 +5,15 @@ use super::output::{create_folder, note, write_file};
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
 use ventriform::base::progress::{CancelToken, Monitor};
-use ventriform::image::volume::Volume;
 use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::phantom::{
-    PerfusionDefect, PhantomParameters, healthy_person, phantom,
+    PerfusionDefect, PhantomParameters, healthy_person, phantom, phantom_projections,
 };
+use ventriform::image::volume::{Provenance, Volume};
+use ventriform::results::export::dicom::{Moment, SourceScan, derived_uid, nuclear_projections};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]
@@ -19,6 +22,8 @@ use ventriform::image::volume::phantom::{
   ventriform phantom -o moved --motion 20
   ventriform phantom -o infarct --defect 3:1 --defect 9:1 --right-ventricle 1.2
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json
+  ventriform phantom -o raw --size 64 --spacing 6.4 --projections --motion 12
+writes also raw/raw.dcm, the projections of a gamma camera, for `segment`, `reconstruct` ...
   ventriform phantom -o healthy --normal --seed 5
 writes 30 healthy hearts (--cases) and healthy/cohort.csv, from which `ventriform normals build` makes limits for \
 tests. They are
@@ -61,12 +66,24 @@ pub struct PhantomArgs {
     /// Heads of the camera, 1 or 2 at a right angle: which views are after the motion
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=2))]
     heads: u8,
+    /// Also write raw.dcm: the projections that a gamma camera counts, as a DICOM NM image (TOMO)
+    #[arg(long, conflicts_with = "normal")]
+    projections: bool,
+    /// Counts of all projections together, millions
+    #[arg(long, value_name = "M", default_value_t = 8.0, value_parser = parse_counts)]
+    counts: f64,
     /// A perfusion defect: AHA segment 1 to 17 (1 to 6 are basal) and severity 0 to 1 (repeatable)
     #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect)]
     defect: Vec<PerfusionDefect>,
     /// Seed of the random numbers for shape and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+}
+
+fn parse_counts(text: &str) -> Result<f64, String> {
+    let millions: Option<f64> = text.parse().ok();
+    let millions = millions.filter(|millions| (0.01..=1000.0).contains(millions));
+    millions.ok_or_else(|| "give millions of counts, 0.01 to 1000".into())
 }
 
 fn parse_defect(text: &str) -> Result<PerfusionDefect, String> {
@@ -111,11 +128,41 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
     let text = serde_json::to_string_pretty(&made.parameters)?;
     write_file(&at("params.json"), text.as_bytes())?;
+    if args.projections {
+        write_file(&at("raw.dcm"), &raw(args, &parameters)?)?;
+    }
     note!(
-        "Written: spect.nii.gz, lv_truth.nii.gz and params.json in {}",
+        "Written: spect.nii.gz, lv_truth.nii.gz{} and params.json in {}",
+        if args.projections { ", raw.dcm" } else { "" },
         args.output.display()
     );
     Ok(())
+}
+
+/// The projections of the phantom as a DICOM file, of a patient of its own.
+fn raw(args: &PhantomArgs, parameters: &PhantomParameters) -> Result<Vec<u8>> {
+    let projections = phantom_projections(parameters, args.counts, &Monitor::silent())?;
+    let text = serde_json::to_string(parameters)?;
+    let made = Moment {
+        date: "20000101".into(),
+        time: "000000".into(),
+    };
+    let whose = Provenance {
+        patient_id: Some(format!("PHANTOM{}", args.seed)),
+        patient_name: Some("Phantom^Simulated".into()),
+        study_uid: Some(derived_uid(&[b"phantom", text.as_bytes()])),
+        ..Provenance::default()
+    };
+    let shape = projections.shape();
+    let frame = VoxelToPatient::centred(shape, [projections.pixel_mm; 3], Vec3::zeros())?;
+    let scan = SourceScan::new(whose, frame, shape, false, made);
+    let heads = usize::from(args.heads);
+    Ok(nuclear_projections(
+        &scan,
+        &projections,
+        heads,
+        PEOPLE_NOTE,
+    )?)
 }
 
 /// The description of the simulated healthy people in their files.

@@ -77,6 +77,7 @@ const LIBRARY_ROOMS: &[&str] = &[
     "heart/judge",
     "heart/fit",
     "heart/polar",
+    "heart/views",
     "heart/beat",
     "heart/normals",
     "heart/comparison",

@@ -46,7 +46,7 @@ mod _native {
     #[pymodule_export]
     use super::values::parameter_tables;
     #[pymodule_export]
-    use super::volumes::NativeVolume;
+    use super::volumes::{NativeVolume, reconstruct};
     use pyo3::prelude::*;
 
     #[pymodule_init]

@@ -7,7 +7,7 @@ use serde_json::{Map, Number, Value};
 use ventriform::parameters::{
     BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, CalibrationChoice, ComparisonChoice,
     FIT_SPECS, Kind, MODEL_SPECS, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec,
-    Parameters, WithFit,
+    Parameters, RECONSTRUCTION_SPECS, WithFit,
 };
 use ventriform::runs::advice::Explain;
 
@@ -115,6 +115,7 @@ pub fn parameter_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let tables = PyDict::new(py);
     tables.set_item("generate", rows(py, MODEL_SPECS)?)?;
     tables.set_item("segment", rows(py, FIT_SPECS)?)?;
+    tables.set_item("reconstruct", rows(py, RECONSTRUCTION_SPECS)?)?;
     let calibrate = rows(py, WithFit::<CalibrationChoice>::fit_specs())?;
     tables.set_item("calibrate", calibrate)?;
     let beat = rows(py, BEAT_SPECS)?;

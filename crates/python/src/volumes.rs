@@ -3,14 +3,16 @@
 use crate::arrays::{affine, voxels};
 use crate::errors::{exception, refused, stopped};
 use crate::run::{How, run};
+use crate::values::table;
 use numpy::{PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use ventriform::base::progress::Plan;
 use ventriform::image::grid::{Affine, ArrayError, Volume};
+use ventriform::image::reconstruct::Reconstruction;
 use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFacts, VolumeFile};
 use ventriform::results::report::FileFacts;
 
@@ -43,6 +45,27 @@ impl NativeVolume {
         })?;
         Ok(self.facts.get_or_init(|| facts))
     }
+}
+
+/// The volume of projections, or those of their gates, reconstructed as the parameters say.
+#[pyfunction]
+#[pyo3(signature = (volume, parameters, summed, how))]
+pub fn reconstruct(
+    py: Python<'_>,
+    volume: Py<NativeVolume>,
+    parameters: &Bound<'_, PyDict>,
+    summed: bool,
+    how: How<'_>,
+) -> PyResult<NativeVolume> {
+    let parameters: Reconstruction = table(parameters)?;
+    let files = &volume.get().files;
+    let made = run(py, Plan::SEGMENTATION, &how, |monitor| {
+        let limits = ReadLimits::default();
+        let made = volume::reconstructed(files, &parameters, summed, &limits, monitor);
+        made.map_err(|error| stopped(&error))
+    })?;
+    let volumes = VolumeFile::of_arrays("the reconstruction", made.volumes);
+    Ok(NativeVolume::new(vec![volumes]))
 }
 
 /// Voxels and their affine to LPS mm.

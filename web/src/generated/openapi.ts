@@ -250,6 +250,11 @@ export interface components {
             attenuation_corrected?: "yes" | "no";
             /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
             axis?: number[];
+            /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
             base?: number[];
             /**
@@ -267,10 +272,38 @@ export interface components {
             /** @description A point in the cavity, x,y,z in LPS millimetres: the search stays within 25 mm of it and does not question it. Default: the organ is searched for in the whole volume */
             center?: number[];
             /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
+            /**
              * @description Damping of the motion per time step
              * @default 1
              */
             damping?: number;
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
             /**
              * @description Whether the volumes of the file are gates of one heart beat although its header says otherwise
              * @default false
@@ -322,6 +355,16 @@ export interface components {
              */
             orbit?: "auto" | "none" | "180" | "360";
             /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -352,6 +395,12 @@ export interface components {
              * @default 10
              */
             reach?: number;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
             /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
@@ -892,6 +941,11 @@ export interface components {
              */
             attenuation_corrected?: "yes" | "no";
             /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
              * @default 3
              */
@@ -901,6 +955,11 @@ export interface components {
              * @default 6
              */
             body_stiffness?: number;
+            /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
             /**
              * @description Damping of the motion per time step
              * @default 1
@@ -912,6 +971,29 @@ export interface components {
              * @enum {string}
              */
             edge?: "apparent" | "anatomical";
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
             /**
              * @description Whether the volumes of both files are gates of one heart beat although their headers say otherwise
              * @default false
@@ -961,6 +1043,16 @@ export interface components {
              */
             orbit?: "auto" | "none" | "180" | "360";
             /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -986,6 +1078,12 @@ export interface components {
              * @default 10
              */
             reach?: number;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
             /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /** @description Id of the volume with the scan at rest */
@@ -3018,6 +3116,31 @@ export interface components {
              */
             volume_error_percent: number;
         };
+        /** @description One movement of the heart. */
+        MoveReport: {
+            /**
+             * Format: double
+             * @description To the back of the patient, mm.
+             */
+            back_mm: number;
+            /**
+             * Format: int64
+             * @description Number in time of the first view after a step, from 1.
+             */
+            from_time?: number | null;
+            /**
+             * Format: double
+             * @description Towards the head, mm.
+             */
+            head_mm: number;
+            /** @description `step`, or `drift` over the whole scan. */
+            kind: string;
+            /**
+             * Format: double
+             * @description To the left of the patient, mm.
+             */
+            left_mm: number;
+        };
         /** @description A key to be made. */
         NewKey: {
             /**
@@ -3170,6 +3293,11 @@ export interface components {
         NormalsFitParameters: {
             /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
             anterior?: number[];
+            /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
             base?: number[];
             /**
@@ -3183,6 +3311,11 @@ export interface components {
              */
             body_stiffness?: number;
             /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
+            /**
              * @description Damping of the motion per time step
              * @default 1
              */
@@ -3193,6 +3326,29 @@ export interface components {
              * @enum {string}
              */
             edge?: "apparent" | "anatomical";
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
             /**
              * @description Final search range of the sensors, millimetres to either side
              * @default 6
@@ -3230,6 +3386,16 @@ export interface components {
              */
             orbit?: "auto" | "none" | "180" | "360";
             /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -3255,6 +3421,12 @@ export interface components {
              * @default 10
              */
             reach?: number;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
             /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
@@ -3354,6 +3526,11 @@ export interface components {
         NormalsParameters: {
             /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
             anterior?: number[];
+            /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
             base?: number[];
             /**
@@ -3369,6 +3546,11 @@ export interface components {
             /** @description The scans of the cohort, and what is known of each */
             cases: components["schemas"]["CohortCase"][];
             /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
+            /**
              * @description Damping of the motion per time step
              * @default 1
              */
@@ -3379,6 +3561,29 @@ export interface components {
              * @enum {string}
              */
             edge?: "apparent" | "anatomical";
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
             /**
              * @description Final search range of the sensors, millimetres to either side
              * @default 6
@@ -3418,6 +3623,16 @@ export interface components {
              */
             orbit?: "auto" | "none" | "180" | "360";
             /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -3443,6 +3658,12 @@ export interface components {
              * @default 10
              */
             reach?: number;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
             /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
             resolution?: number;
             /**
@@ -3936,6 +4157,28 @@ export interface components {
              * @example urn:ventriform:problem:unknown-parameter
              */
             type: string;
+        };
+        /** @description The projections that slices were reconstructed of, and the heart's motion in them. */
+        ProjectionsReport: {
+            /**
+             * Format: double
+             * @description Counts of all views.
+             */
+            counts: number;
+            /** @description Whether the heart moved; `null` if that was not measured. */
+            moved?: boolean | null;
+            /** @description How it moved. */
+            moves: components["schemas"]["MoveReport"][];
+            /**
+             * Format: double
+             * @description Edge of a pixel, mm.
+             */
+            pixel_mm: number;
+            /** @description The greatest distance between its places in two views, mm: along the table, and across it on the detector. */
+            range_mm?: number[] | null;
+            uncorrected?: components["schemas"]["UncorrectedReport"] | null;
+            /** @description The views, in the order in which the camera turned. */
+            views: components["schemas"]["ViewReport"][];
         };
         /** @description How fast the ventricle empties and fills. */
         RatesReport: {
@@ -4502,7 +4745,7 @@ export interface components {
             volume: string;
         };
         /** @enum {string} */
-        SegmentationFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "mesh_anatomical.glb" | "mesh_anatomical.gltf" | "mesh_anatomical.stl" | "mesh_anatomical.ply" | "mesh_anatomical.obj" | "mesh_anatomical.vtp" | "mesh_anatomical.vtk" | "mesh_anatomical.json" | "mesh_apparent.glb" | "mesh_apparent.gltf" | "mesh_apparent.stl" | "mesh_apparent.ply" | "mesh_apparent.obj" | "mesh_apparent.vtp" | "mesh_apparent.vtk" | "mesh_apparent.json" | "mask.nii.gz" | "mask_anatomical.nii.gz" | "mask_apparent.nii.gz" | "labels.nii.gz" | "labels.seg.nrrd" | "report.json" | "report.html" | "slices.png" | "region.nii.gz" | "polar.json" | "polar.svg" | "polar.png" | "polar_z.json" | "polar_z.svg" | "polar_z.png" | "polar_score.json" | "polar_score.svg" | "polar_score.png" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm";
+        SegmentationFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "mesh_anatomical.glb" | "mesh_anatomical.gltf" | "mesh_anatomical.stl" | "mesh_anatomical.ply" | "mesh_anatomical.obj" | "mesh_anatomical.vtp" | "mesh_anatomical.vtk" | "mesh_anatomical.json" | "mesh_apparent.glb" | "mesh_apparent.gltf" | "mesh_apparent.stl" | "mesh_apparent.ply" | "mesh_apparent.obj" | "mesh_apparent.vtp" | "mesh_apparent.vtk" | "mesh_apparent.json" | "mask.nii.gz" | "mask_anatomical.nii.gz" | "mask_apparent.nii.gz" | "labels.nii.gz" | "labels.seg.nrrd" | "report.json" | "report.html" | "slices.png" | "region.nii.gz" | "projections.png" | "polar.json" | "polar.svg" | "polar.png" | "polar_z.json" | "polar_z.svg" | "polar_z.png" | "polar_score.json" | "polar_score.svg" | "polar_score.png" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm";
         SegmentationForm: {
             /**
              * Format: binary
@@ -4591,6 +4834,11 @@ export interface components {
             attenuation_corrected?: "yes" | "no";
             /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
             axis?: number[];
+            /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
             base?: number[];
             /**
@@ -4608,6 +4856,11 @@ export interface components {
             /** @description A point in the cavity, x,y,z in LPS millimetres: the search stays within 25 mm of it and does not question it. Default: the organ is searched for in the whole volume */
             center?: number[];
             /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
+            /**
              * @description Damping of the motion per time step
              * @default 1
              */
@@ -4618,8 +4871,31 @@ export interface components {
              * @enum {string}
              */
             edge?: "apparent" | "anatomical";
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
             /** @description Id of a volume with an expert's mask to compare with: a mask, a label map, a DICOM Segmentation, probabilities of which those above 0.5 count, or a closed mesh (STL, PLY, OBJ, VTK, VTP, glTF) */
             expert?: string;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
             /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
             frame?: number;
             /**
@@ -4693,6 +4969,16 @@ export interface components {
              */
             organ?: "left_ventricle" | "liver" | "kidney" | "generic";
             /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -4725,6 +5011,12 @@ export interface components {
             reach?: number;
             /** @description Id of a reader's profile to draw the wall by: moves the endocardium, the epicardium and the rim by the distances that `ventriform calibrate` learnt from that reader's masks. Its edge must be that of `edge`. Default: the wall as it was fitted */
             reader?: string;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
             /**
              * @description Whether an expert's mask on another grid of voxels is resampled by the nearest voxel; without it, such a mask is refused
              * @default false
@@ -4819,6 +5111,7 @@ export interface components {
             perfusion?: components["schemas"]["Perfusion"] | null;
             polar?: components["schemas"]["PolarSummary"] | null;
             posture?: components["schemas"]["Posture"] | null;
+            projections?: components["schemas"]["ProjectionsReport"] | null;
             reader?: components["schemas"]["AppliedReader"] | null;
             /** @description Models that could not be fitted. */
             refused: components["schemas"]["RefusedTemplate"][];
@@ -5442,6 +5735,28 @@ export interface components {
              */
             percentile_95: number;
         };
+        /** @description What a fit gave before views were shifted back. */
+        UncorrectedReport: {
+            /**
+             * Format: double
+             * @description Volume of the cavity, ml.
+             */
+            cavity_ml?: number | null;
+            /**
+             * Format: double
+             * @description Confidence.
+             */
+            confidence: number;
+            /** @description What each segment gained by the correction, points. */
+            segments_change: (number | null)[];
+            /** @description Uptake of the 17 segments, % of the reference. */
+            segments_percent: (number | null)[];
+            /**
+             * Format: double
+             * @description Volume of the wall, ml.
+             */
+            wall_ml: number;
+        };
         UploadForm: {
             /**
              * Format: binary
@@ -5499,6 +5814,44 @@ export interface components {
          * @enum {string}
          */
         Verdict: "yes" | "no" | "cannot_tell";
+        /** @description One view. */
+        ViewReport: {
+            /**
+             * Format: double
+             * @description How far towards higher columns of the detector, mm.
+             */
+            across_mm?: number | null;
+            /**
+             * Format: double
+             * @description How far towards the head the heart lay from its mean place, mm, as measured in this view alone.
+             */
+            along_mm?: number | null;
+            /**
+             * Format: double
+             * @description Angle of the detector about the patient, degrees: 0 at the back, 90 at the left side.
+             */
+            angle_deg: number;
+            /**
+             * Format: double
+             * @description Counts.
+             */
+            counts: number;
+            /**
+             * Format: double
+             * @description The second by the moves that are told, mm.
+             */
+            moved_across_mm?: number | null;
+            /**
+             * Format: double
+             * @description The first by the moves that are told, mm.
+             */
+            moved_along_mm?: number | null;
+            /**
+             * Format: int64
+             * @description Number in time, from 1; views of several detectors at one time have the same.
+             */
+            time: number;
+        };
         /** @description A stored volume: what its header says. */
         Volume: {
             /** @description Maps a voxel index to millimetres in the patient frame LPS; row by row. */
@@ -5854,6 +6207,7 @@ export type ModelList = components['schemas']['ModelList'];
 export type ModelParameters = components['schemas']['ModelParameters'];
 export type ModelReport = components['schemas']['ModelReport'];
 export type ModelSummary = components['schemas']['ModelSummary'];
+export type MoveReport = components['schemas']['MoveReport'];
 export type NewKey = components['schemas']['NewKey'];
 export type NoBeat = components['schemas']['NoBeat'];
 export type NoBeatCode = components['schemas']['NoBeatCode'];
@@ -5886,6 +6240,7 @@ export type PolarSummary = components['schemas']['PolarSummary'];
 export type Posture = components['schemas']['Posture'];
 export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
+export type ProjectionsReport = components['schemas']['ProjectionsReport'];
 export type RatesReport = components['schemas']['RatesReport'];
 export type Reader = components['schemas']['Reader'];
 export type ReaderFileName = components['schemas']['ReaderFileName'];
@@ -5949,10 +6304,12 @@ export type Thicknesses = components['schemas']['Thicknesses'];
 export type TimingReport = components['schemas']['TimingReport'];
 export type Uncertainties = components['schemas']['Uncertainties'];
 export type Uncertainty = components['schemas']['Uncertainty'];
+export type UncorrectedReport = components['schemas']['UncorrectedReport'];
 export type UploadForm = components['schemas']['UploadForm'];
 export type UptakeChange = components['schemas']['UptakeChange'];
 export type Valence = components['schemas']['Valence'];
 export type Verdict = components['schemas']['Verdict'];
+export type ViewReport = components['schemas']['ViewReport'];
 export type Volume = components['schemas']['Volume'];
 export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeIntervals = components['schemas']['VolumeIntervals'];

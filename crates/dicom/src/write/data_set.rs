@@ -95,6 +95,21 @@ impl DataSet {
         );
     }
 
+    /// Puts numbers of double precision.
+    pub fn doubles(&mut self, tag: Tag, numbers: &[f64]) {
+        self.put(tag, VR::FD, PrimitiveValue::F64(numbers.into()));
+    }
+
+    /// Puts the tags of other attributes.
+    pub fn tags(&mut self, tag: Tag, named: &[Tag]) {
+        self.put(tag, VR::AT, PrimitiveValue::Tags(named.into()));
+    }
+
+    /// Puts words of 16 bits, given as bytes, the lower first.
+    pub fn words(&mut self, tag: Tag, bytes: Vec<u8>) {
+        self.put(tag, VR::OW, PrimitiveValue::U8(bytes.into()));
+    }
+
     /// Puts the tag of another attribute.
     pub fn tag(&mut self, tag: Tag, named: Tag) {
         self.put(tag, VR::AT, PrimitiveValue::from(named));

@@ -381,7 +381,13 @@ pub struct Counts {
 /// Counts of rays.
 ///
 /// `share` is the share of the acquisition's counts that these rays have, `gate` names the streams.
-pub fn count(rays: &Rays, acquisition: &Acquisition, bin_mm: f64, exposure: &Exposure) -> Counts {
+pub fn count(
+    rays: &Rays,
+    views_of: &[View],
+    acquisition: &Acquisition,
+    bin_mm: f64,
+    exposure: &Exposure,
+) -> Counts {
     let mut spread = Grid::zeros(rays.scatter.shape);
     for (part, sd_mm) in SCATTER_SPREAD {
         let mut wide = rays.scatter.clone();
@@ -413,8 +419,11 @@ pub fn count(rays: &Rays, acquisition: &Acquisition, bin_mm: f64, exposure: &Exp
     expected.values.iter_mut().for_each(|e| *e *= factor);
     scatter.values.iter_mut().for_each(|s| *s *= factor);
     if let Some(motion) = &acquisition.body_motion {
-        for view in 0..views {
-            shift_view(&mut expected, view, motion.at(view, views) / bin_mm);
+        for (view, place) in views_of.iter().enumerate() {
+            let [dx, dy] = motion.across(view, views);
+            let across = dy * place.cos - dx * place.sin;
+            let shift_mm = [across, motion.at(view, views)];
+            shift_view(&mut expected, view, shift_mm.map(|mm| mm / bin_mm));
         }
     }
     let draw = |grid: &Grid, factor: f64, stream: &(dyn Fn(usize) -> Stream + Sync)| {
@@ -467,20 +476,29 @@ pub struct Exposure {
     pub side_window: bool,
 }
 
-/// Shifts a view along the axis, by linear interpolation.
-fn shift_view(grid: &mut Grid, view: usize, bins: f64) {
-    if bins == 0.0 {
-        return;
-    }
+/// Shifts a view by bins across the axis and along it, by linear interpolation.
+fn shift_view(grid: &mut Grid, view: usize, [along_u, along_z]: [f64; 2]) {
     let [_, across, along] = grid.shape;
-    for u in 0..across {
-        let start = grid.index([view, u, 0]);
-        let row = grid.values[start..start + along].to_vec();
-        for (z, out) in grid.values[start..start + along].iter_mut().enumerate() {
-            let from = (z as f64 - bins).clamp(0.0, (along - 1) as f64);
-            let low = (from as usize).min(along - 2);
-            let share = (from - low as f64) as f32;
-            *out = row[low] + share * (row[low + 1] - row[low]);
+    let size = across * along;
+    let own = &mut grid.values[view * size..(view + 1) * size];
+    let mut lines = vec![
+        (0..across)
+            .map(|u| (u * along, 1, along))
+            .collect::<Vec<_>>(),
+    ];
+    lines.push((0..along).map(|z| (z, along, across)).collect());
+    for (bins, lines) in [along_z, along_u].into_iter().zip(lines) {
+        if bins == 0.0 {
+            continue;
+        }
+        for (start, step, count) in lines {
+            let line: Vec<f32> = (0..count).map(|n| own[start + n * step]).collect();
+            for n in 0..count {
+                let from = (n as f64 - bins).clamp(0.0, (count - 1) as f64);
+                let low = (from as usize).min(count - 2);
+                let share = (from - low as f64) as f32;
+                own[start + n * step] = line[low] + share * (line[low + 1] - line[low]);
+            }
         }
     }
 }

@@ -238,8 +238,8 @@ fn profile(kind: Kind, d: &mut Draws, sampling: Sampling) -> Profile {
                 BodyMotion {
                     from_view_fraction: d.uniform(0.2, 0.6),
                     dz_mm: d.uniform(5.0, 20.0),
-                    drift_mm: 0.0,
                     bounce_fraction: d.uniform(0.1, 0.3),
+                    ..BodyMotion::default()
                 }
             };
             Profile {

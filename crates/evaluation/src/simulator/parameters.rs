@@ -313,7 +313,7 @@ pub struct Collimator {
     pub intrinsic_fwhm_mm: f64,
 }
 
-/// The patient's movement towards the head.
+/// The patient's movement, towards the head and across the table.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct BodyMotion {
     /// When a step begins, as a share of the views.
@@ -324,15 +324,34 @@ pub struct BodyMotion {
     pub drift_mm: f64,
     /// Share of the views after which the patient is back; 0 stays away.
     pub bounce_fraction: f64,
+    /// The step across the table: to the left and to the back.
+    pub across_mm: [f64; 2],
 }
 
 impl BodyMotion {
-    /// How far the patient lies from the first place in a view.
+    /// How far towards the head the patient lies from the first place in a view.
     pub fn at(&self, view: usize, views: usize) -> f64 {
         let share = view as f64 / (views.max(2) - 1) as f64;
+        let step = if self.is_away(view, views) {
+            self.dz_mm
+        } else {
+            0.0
+        };
+        self.drift_mm * share + step
+    }
+
+    /// How far to the left and to the back.
+    pub fn across(&self, view: usize, views: usize) -> [f64; 2] {
+        if self.is_away(view, views) {
+            self.across_mm
+        } else {
+            [0.0; 2]
+        }
+    }
+
+    fn is_away(&self, view: usize, views: usize) -> bool {
         let since = view as f64 / views as f64 - self.from_view_fraction;
-        let away = since >= 0.0 && (self.bounce_fraction == 0.0 || since < self.bounce_fraction);
-        self.drift_mm * share + if away { self.dz_mm } else { 0.0 }
+        since >= 0.0 && (self.bounce_fraction == 0.0 || since < self.bounce_fraction)
     }
 }
 

@@ -6,7 +6,7 @@ use super::anatomy::ventricle::Ventricle;
 use super::anatomy::{Directions, Place, Vec3};
 use super::camera::{Camera, Counts, Exposure, POINTS_PER_BIN, Rays, count};
 use super::grid::{FWHM_PER_SD, Grid};
-use super::parameters::{Parameters, Reconstruction};
+use super::parameters::{Acquisition, Parameters, Reconstruction};
 use super::reconstruct::{Knowledge, reconstruct};
 use std::ops::Range;
 
@@ -129,19 +129,25 @@ impl<'a> Scene<'a> {
 
     /// The counts of a gate, which has a share of the acquisition's.
     pub fn counts(&self, gate: usize, share: f64) -> Counts {
+        self.counts_of(&self.rays(gate), &self.parameters.acquisition, gate, share)
+    }
+
+    /// The counts of the rays of a gate in an acquisition, which has the scene's views.
+    pub fn counts_of(
+        &self,
+        rays: &Rays,
+        acquisition: &Acquisition,
+        gate: usize,
+        share: f64,
+    ) -> Counts {
         let exposure = Exposure {
             seed: self.parameters.noise_seed,
             gate,
             share,
             side_window: self.parameters.reconstruction.scatter_corrected,
         };
-        let acquisition = &self.parameters.acquisition;
-        count(
-            &self.rays(gate),
-            acquisition,
-            self.parameters.spacing_mm,
-            &exposure,
-        )
+        let bin_mm = self.parameters.spacing_mm;
+        count(rays, &self.camera.views, acquisition, bin_mm, &exposure)
     }
 
     /// The image of counts.

@@ -37,6 +37,7 @@ impl ProductCollection for Segmentations {
         files::REPORT_PAGE,
         "slices.png",
         "region.nii.gz",
+        "projections.png",
         "polar.json",
         "polar.svg",
         "polar.png",

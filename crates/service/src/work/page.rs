@@ -48,6 +48,7 @@ pub(super) const SEGMENTATION_FILES: &[&str] = &[
     "polar.svg",
     "polar.json",
     "region.nii.gz",
+    "projections.png",
 ];
 
 /// The files that [`beat_page`] reads.
@@ -134,6 +135,7 @@ pub(super) fn segmentation_page(
         .map(|text| from_json("polar.json", &text))
         .transpose()?;
     let region = optional(read, "region.nii.gz")?;
+    let projections = optional(read, "projections.png")?;
     Ok(report::segmentation_page(&SegmentationPage {
         report: &report,
         mesh: &mesh,
@@ -145,6 +147,7 @@ pub(super) fn segmentation_page(
         polar: polar.as_deref(),
         polar_map: polar_map.as_ref(),
         region: region.as_deref(),
+        projections: projections.as_deref(),
         scan: Some(&first(scans)),
     }))
 }

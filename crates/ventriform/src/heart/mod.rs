@@ -1,5 +1,5 @@
 //! The left ventricle of a patient: a model fitted to the volume ([`model`], [`deform`], [`judge`], [`fit`]), the wall's
-//! uptake ([`polar`]) and motion ([`beat`]), compared with healthy people ([`normals`]), between rest and stress
+//! uptake ([`polar`]) and motion ([`beat`], during the scan [`views`]), compared with healthy people ([`normals`]), between rest and stress
 //! ([`comparison`]), and drawn as a reader draws it ([`reader`]).
 
 pub mod model;
@@ -11,6 +11,8 @@ pub mod judge;
 pub mod fit;
 
 pub mod polar;
+
+pub mod views;
 
 pub mod beat;
 

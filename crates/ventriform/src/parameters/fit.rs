@@ -9,6 +9,7 @@ use crate::heart::normals::ScanKind;
 use crate::heart::polar::PolarParameters;
 use crate::image::locate::Hints;
 use crate::image::locate::patient_orientation::Superior;
+use crate::image::reconstruct::Reconstruction;
 use crate::image::volume::given_mask::MaskChoice;
 use crate::image::volume::{AffineSource, Provenance, Volume};
 
@@ -45,6 +46,10 @@ pub struct FitParameters {
     pub polar: PolarParameters,
     /// The grid on which masks and labels are written.
     pub mask_grid: MaskGrid,
+    /// How slices are made of projections.
+    pub reconstruction: Reconstruction,
+    /// Whether views of projections in which the heart lies elsewhere are shifted back.
+    pub correct_motion: bool,
 }
 
 /// The grid on which masks and labels are written.
@@ -75,6 +80,8 @@ impl Default for FitParameters {
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
             mask_grid: MaskGrid::default(),
+            reconstruction: Reconstruction::default(),
+            correct_motion: false,
         }
     }
 }

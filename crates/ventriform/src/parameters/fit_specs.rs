@@ -1,6 +1,7 @@
 //! The table of the parameters of a fit.
 
-use super::table::{choice, integer, number, optional, titled};
+use super::reconstruction::reconstruction_rows;
+use super::table::{choice, integer, joined, number, optional, titled};
 use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters, groups};
 use crate::base::geometry::Vec3;
 use crate::heart::deform::sensors::SensorKind;
@@ -9,6 +10,7 @@ use crate::heart::model::Organ;
 use crate::heart::normals::{Sex, yes_or_no};
 use crate::heart::polar::Projection;
 use crate::image::locate::patient_orientation::Superior;
+use crate::image::reconstruct::{Filter, Method};
 use crate::image::volume::given_mask::MaskLabel;
 use crate::mesh::files::{MeshFrame, MeshUnit};
 use serde_json::{Value, json};
@@ -49,8 +51,34 @@ macro_rules! scan_name {
     };
 }
 
-/// Every parameter of a fit, in the order in which the stages use them.
-pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
+/// Every parameter of a fit, in the order in which the stages use them; those of projections last.
+pub const FIT_SPECS: &[ParameterSpec<FitParameters>] =
+    &joined::<_, { OF_FIT.len() + OF_PROJECTIONS.len() + 1 }>(
+        &joined::<_, { OF_FIT.len() + OF_PROJECTIONS.len() }>(OF_FIT, &OF_PROJECTIONS),
+        &[CORRECT_MOTION],
+    );
+
+/// How slices are made of projections.
+const OF_PROJECTIONS: [ParameterSpec<FitParameters>; 9] =
+    reconstruction_rows!(groups::PROJECTIONS, reconstruction.);
+
+const CORRECT_MOTION: ParameterSpec<FitParameters> = ParameterSpec {
+    name: "correct_motion",
+    title: "",
+    group: groups::PROJECTIONS,
+    unit: "",
+    kind: Kind::Switch,
+    default: "false",
+    summary: "Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are \
+              made again. Reports state the motion and both results",
+    read: |d, v| {
+        d.correct_motion = v.switch();
+        Ok(())
+    },
+    write: |p| json!(p.correct_motion),
+};
+
+const OF_FIT: &[ParameterSpec<FitParameters>] = &[
     ParameterSpec {
         name: "model",
         title: "Model to fit",

@@ -22,6 +22,8 @@ pub const PLACE: &str = "Where the heart is";
 pub const EDGE: &str = "Edge of the wall";
 /// How the image was made, and the grid of what is written.
 pub const IMAGE: &str = "Image";
+/// How slices are made of projections.
+pub const PROJECTIONS: &str = "Projections";
 /// Springs and motion of the model.
 pub const SPRINGS: &str = "Springs";
 /// The polar map.

@@ -15,82 +15,91 @@ impl Parameters for Reconstruction {
     }
 }
 
+/// The rows of a reconstruction in the table of parameters that hold it under a path of fields.
+macro_rules! reconstruction_rows {
+    ($group:path, $($path:ident .)*) => {
+        [
+            optional!(
+                Integer usize, "energy_window", $($path .)* energy_window => $($path .)* energy_window, 1..=64, $group, "",
+                "Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of \
+                 the radionuclide"
+            ),
+            number!(
+                "axis_offset_mm",
+                $($path .)* axis_offset_mm,
+                -50.0..=50.0,
+                "0",
+                $group,
+                "mm",
+                "How far the axis of rotation lies from the middle of the frames towards higher columns, mm"
+            ),
+            choice!(
+                "reconstruction", $($path .)* method, "osem", $group,
+                "How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)",
+                "osem" => Method::Osem,
+                "fbp" => Method::Fbp,
+            ),
+            integer!(
+                "osem_iterations",
+                $($path .)* iterations,
+                1..=100,
+                "3",
+                $group,
+                "",
+                "Iterations of OSEM over all subsets; more sharpen the image and its noise"
+            ),
+            integer!(
+                "osem_subsets",
+                $($path .)* subsets,
+                1..=64,
+                "10",
+                $group,
+                "",
+                "Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is \
+                 less than half of it"
+            ),
+            choice!(
+                "filter", $($path .)* filter, "butterworth", $group,
+                "What keeps noise out of the image: butterworth, gaussian or none",
+                "butterworth" => Filter::Butterworth,
+                "gaussian" => Filter::Gaussian,
+                "none" => Filter::None,
+            ),
+            number!(
+                "filter_cut_off_per_cm",
+                $($path .)* cut_off_per_cm,
+                0.05..=5.0,
+                "0.5",
+                $group,
+                "1/cm",
+                "Frequency of which the Butterworth filter leaves 71 %, cycles per cm"
+            ),
+            integer!(
+                "filter_order",
+                $($path .)* filter_order,
+                1..=20,
+                "5",
+                $group,
+                "",
+                "Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f"
+            ),
+            number!(
+                "filter_fwhm_mm",
+                $($path .)* fwhm_mm,
+                1.0..=50.0,
+                "10",
+                $group,
+                "mm",
+                "Width of the Gaussian filter at half of its maximum, mm"
+            ),
+        ]
+    };
+}
+pub(super) use reconstruction_rows;
+
 /// Every parameter of a reconstruction, in the order in which its steps use them.
-pub const RECONSTRUCTION_SPECS: &[ParameterSpec<Reconstruction>] = &[
-    optional!(
-        Integer usize, "energy_window", energy_window => energy_window, 1..=64, groups::MAIN, "",
-        "Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of \
-         the radionuclide"
-    ),
-    number!(
-        "axis_offset_mm",
-        axis_offset_mm,
-        -50.0..=50.0,
-        "0",
-        groups::MAIN,
-        "mm",
-        "How far the axis of rotation lies from the middle of the frames towards higher columns, mm"
-    ),
-    choice!(
-        "method", method, "osem", groups::MAIN,
-        "How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)",
-        "osem" => Method::Osem,
-        "fbp" => Method::Fbp,
-    ),
-    integer!(
-        "iterations",
-        iterations,
-        1..=100,
-        "3",
-        groups::MAIN,
-        "",
-        "Iterations of OSEM over all subsets; more sharpen the image and its noise"
-    ),
-    integer!(
-        "subsets",
-        subsets,
-        1..=64,
-        "10",
-        groups::MAIN,
-        "",
-        "Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less \
-         than half of it"
-    ),
-    choice!(
-        "filter", filter, "butterworth", groups::MAIN,
-        "What keeps noise out of the image: butterworth, gaussian or none",
-        "butterworth" => Filter::Butterworth,
-        "gaussian" => Filter::Gaussian,
-        "none" => Filter::None,
-    ),
-    number!(
-        "cut_off_per_cm",
-        cut_off_per_cm,
-        0.05..=5.0,
-        "0.5",
-        groups::MAIN,
-        "1/cm",
-        "Frequency of which the Butterworth filter leaves 71 %, cycles per cm"
-    ),
-    integer!(
-        "filter_order",
-        filter_order,
-        1..=20,
-        "5",
-        groups::MAIN,
-        "",
-        "Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f"
-    ),
-    number!(
-        "fwhm_mm",
-        fwhm_mm,
-        1.0..=50.0,
-        "10",
-        groups::MAIN,
-        "mm",
-        "Width of the Gaussian filter at half of its maximum, mm"
-    ),
-];
+pub const RECONSTRUCTION_SPECS: &[ParameterSpec<Reconstruction>] =
+    &reconstruction_rows!(groups::MAIN,);
 
 #[cfg(test)]
 mod tests {
@@ -105,14 +114,14 @@ mod tests {
         checks::read_back_unchanged::<Reconstruction>(&[
             &[],
             &[
-                ("method", "fbp"),
+                ("reconstruction", "fbp"),
                 ("filter", "gaussian"),
-                ("fwhm_mm", "8.5"),
+                ("filter_fwhm_mm", "8.5"),
                 ("energy_window", "2"),
             ],
             &[
-                ("iterations", "5"),
-                ("subsets", "6"),
+                ("osem_iterations", "5"),
+                ("osem_subsets", "6"),
                 ("axis_offset_mm", "-2.5"),
             ],
         ]);
@@ -135,11 +144,11 @@ mod tests {
                 max: *range.end(),
             };
             let kind = match spec.name {
-                "iterations" => whole(ITERATIONS),
-                "subsets" => whole(SUBSETS),
+                "osem_iterations" => whole(ITERATIONS),
+                "osem_subsets" => whole(SUBSETS),
                 "filter_order" => whole(FILTER_ORDER),
-                "cut_off_per_cm" => numbers(CUT_OFF_PER_CM),
-                "fwhm_mm" => numbers(FWHM_MM),
+                "filter_cut_off_per_cm" => numbers(CUT_OFF_PER_CM),
+                "filter_fwhm_mm" => numbers(FWHM_MM),
                 "axis_offset_mm" => numbers(AXIS_OFFSET_MM),
                 _ => continue,
             };
@@ -150,10 +159,10 @@ mod tests {
     #[test]
     fn wrong_names_and_values_are_refused_by_name() {
         for (name, text, fix) in [
-            ("iteration", "3", "`iterations`"),
-            ("iterations", "0", "1 to 100"),
-            ("cut_off_per_cm", "nan", "0.05 to 5"),
-            ("method", "mlem", "osem, fbp"),
+            ("osem_iteration", "3", "`osem_iterations`"),
+            ("osem_iterations", "0", "1 to 100"),
+            ("filter_cut_off_per_cm", "nan", "0.05 to 5"),
+            ("reconstruction", "mlem", "osem, fbp"),
             ("energy_window", "0", "1 to 64"),
         ] {
             let refused = Reconstruction::from_pairs([(name, text)]).unwrap_err();

@@ -27,6 +27,32 @@ pub struct ParameterSpec<P: Parameters> {
     pub(super) write: fn(&P) -> Value,
 }
 
+impl<P: Parameters> Clone for ParameterSpec<P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<P: Parameters> Copy for ParameterSpec<P> {}
+
+/// The rows of two tables, `N` together, as one.
+pub(super) const fn joined<P: Parameters, const N: usize>(
+    first: &[ParameterSpec<P>],
+    second: &[ParameterSpec<P>],
+) -> [ParameterSpec<P>; N] {
+    let mut all = [first[0]; N];
+    let mut at = 0;
+    while at < N {
+        all[at] = if at < first.len() {
+            first[at]
+        } else {
+            second[at - first.len()]
+        };
+        at += 1;
+    }
+    all
+}
+
 /// `row` with a name that people read other than its own in words.
 pub(super) const fn titled<P: Parameters>(
     title: &'static str,

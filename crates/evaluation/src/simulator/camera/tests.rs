@@ -142,7 +142,7 @@ fn counts_are_as_many_as_stated_and_scatter_has_its_share() {
         share: 0.5,
         side_window: true,
     };
-    let made = count(&rays, &p.acquisition, BIN_MM, &exposure);
+    let made = count(&rays, &camera.views, &p.acquisition, BIN_MM, &exposure);
     assert!((made.expected.sum() / 150_000.0 - 1.0).abs() < 1e-3);
     assert!((made.counts.sum() - 150_000.0).abs() < 5.0 * 150_000.0_f64.sqrt());
     let scattered = made.scatter.expect("a side window").sum();
@@ -172,6 +172,7 @@ fn motion_shifts_the_views_after_it() {
     };
     let made = count(
         &camera.project(&image, None),
+        &camera.views,
         &p.acquisition,
         BIN_MM,
         &exposure,

@@ -48,6 +48,35 @@ pub enum Flag {
         /// The figures it comes from.
         evidence: Evidence,
     },
+    /// The heart moved in the projections.
+    #[error(
+        "the heart moved during the scan: by up to {along_mm:.1} mm along the table and {across_mm:.1} mm across it, \
+         measured in the projections. {}",
+        if *corrected {
+            "Its views were shifted back, and slices and fit made again: compare both results"
+        } else {
+            "`correct_motion` shifts the views back"
+        }
+    )]
+    Moved {
+        /// Along the axis of rotation, mm.
+        along_mm: f64,
+        /// On the detector across it, mm.
+        across_mm: f64,
+        /// Whether the views were shifted back.
+        corrected: bool,
+    },
+    /// A view has other counts than those beside it.
+    #[error(
+        "view {view} of the projections has {percent:+.0} % more counts than the views beside it: it may have been cut \
+         short, repeated or added up wrongly"
+    )]
+    OddView {
+        /// Its number, from 1, in the order in which the camera turned.
+        view: usize,
+        /// How many more counts it has, %.
+        percent: f64,
+    },
     /// The model bulges towards the right ventricle.
     #[error(
         "the right ventricle's wall may have been taken for the septum: the distance of the wall from \
@@ -338,7 +367,8 @@ impl Flag {
         match self {
             Flag::UncertainPlace { .. } => "uncertain_place",
             Flag::UncertainFit { .. } => "uncertain_fit",
-            Flag::Motion { .. } => "motion",
+            Flag::Motion { .. } | Flag::Moved { .. } => "motion",
+            Flag::OddView { .. } => "view_counts",
             Flag::RightVentricle { .. } => "right_ventricle",
             Flag::LabelMap { .. } => "label_map",
             Flag::Saturated(_) => "saturated",

@@ -168,7 +168,11 @@ fn bin_axis(bins: &Bins) -> ChartAxis {
     ChartAxis::with_steps(lower, upper, tick_step(upper - lower, 6), "")
 }
 
-/// Lines over a common x, marked at every x that has a point; nothing where there is no point.
+/// Most marks of the x axis of [`lines`].
+const MOST_MARKS: usize = 16;
+
+/// Lines over a common x, marked at every x that has a point, or at every second, third ... of more than
+/// [`MOST_MARKS`]; nothing where there is no point.
 pub fn lines(title: &str, x_label: &str, series: &[Series]) -> Markup {
     let all: Vec<(f64, f64)> = series.iter().flat_map(|s| s.points.clone()).collect();
     if all.is_empty() {
@@ -186,7 +190,9 @@ pub fn lines(title: &str, x_label: &str, series: &[Series]) -> Markup {
         x: ChartAxis {
             from,
             to,
-            marks: places.iter().map(|x| (*x, x.to_string())).collect(),
+            marks: (places.iter().step_by(places.len().div_ceil(MOST_MARKS)))
+                .map(|x| (*x, x.to_string()))
+                .collect(),
         },
         y: ChartAxis::with_steps(
             (low / step).floor() * step,

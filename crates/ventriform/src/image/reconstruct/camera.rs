@@ -135,6 +135,38 @@ impl Camera {
     }
 }
 
+/// The frames of all views of an image on [`Projections::shape`], view after view, rows from the head to the feet.
+pub(super) fn projected(camera: &Camera, image: &[f32], rows: usize) -> Vec<f32> {
+    let plane = camera.count * camera.count;
+    let pack = |start: &usize| {
+        let mut pack = vec![[0.0; LANES]; plane];
+        for lane in 0..LANES.min(rows - start) {
+            let slice = &image[(rows - 1 - start - lane) * plane..][..plane];
+            for (lanes, value) in pack.iter_mut().zip(slice) {
+                lanes[lane] = *value;
+            }
+        }
+        pack
+    };
+    let starts: Vec<usize> = (0..rows).step_by(LANES).collect();
+    let packs: Vec<Vec<Lanes>> = starts.par_iter().map(pack).collect();
+    let mut frames = vec![0.0; camera.turns.len() * rows * camera.count];
+    let by_view = frames.par_chunks_mut(rows * camera.count).enumerate();
+    by_view.for_each(|(view, frame)| {
+        let mut sums = vec![[0.0; LANES]; camera.count];
+        for (start, pack) in starts.iter().zip(&packs) {
+            camera.project(view, pack, &mut sums);
+            let rows = frame.chunks_exact_mut(camera.count).skip(*start);
+            for (lane, row) in rows.take(LANES).enumerate() {
+                for (value, sum) in row.iter_mut().zip(&sums) {
+                    *value = sum[lane];
+                }
+            }
+        }
+    });
+    frames
+}
+
 /// The volume whose packs of slices `make` makes of the rows from a number on, so many of them. Rows of frames run to
 /// the feet and slices to the head.
 pub(super) fn in_packs(

@@ -9,6 +9,8 @@
 //!    filtered back projection (Kak and Slaney 1988, chapter 3).
 //! 3. `filter`: the Butterworth or Gaussian filter, by the image's spectrum.
 //!
+//! [`motion`]: where the heart was in each view, measured in the projections themselves.
+//!
 //! Values are counts: the sum of a volume is about the counts of one view. Nothing is below 0.
 //!
 //! Guaranteed: the same bytes for the same input whatever the number of threads: slices are worked on in packs, each
@@ -22,6 +24,7 @@
 mod camera;
 mod fbp;
 mod filter;
+pub mod motion;
 mod osem;
 mod parameters;
 mod projections;
@@ -32,10 +35,30 @@ pub use parameters::{
     AXIS_OFFSET_MM, CUT_OFF_PER_CM, FILTER_ORDER, FWHM_MM, Filter, ITERATIONS, Method,
     Reconstruction, SUBSETS,
 };
-pub use projections::{Projections, ProjectionsError, View};
+pub use projections::{ODD_VIEW_PERCENT, OddView, Projections, ProjectionsError, View};
 
 use self::camera::Camera;
 use crate::base::progress::{Cancelled, Monitor};
+
+/// What a camera with `views` sees of an image of cubes of `pixel_mm`, x the fastest, with as many columns along y as
+/// along x and so many rows along z: the sums along its rays.
+pub fn project(
+    image: &[f32],
+    [columns, rows]: [usize; 2],
+    pixel_mm: f64,
+    views: Vec<View>,
+) -> Projections {
+    let mut projections = Projections {
+        counts: Vec::new(),
+        columns,
+        rows,
+        pixel_mm,
+        views,
+    };
+    let camera = Camera::new(&projections, 0.0);
+    projections.counts = camera::projected(&camera, image, rows);
+    projections
+}
 
 /// The voxels of the volume of `projections`, x the fastest, on [`Projections::shape`]. Reports
 /// [`Stage::Read`](crate::base::progress::Stage::Read).

@@ -26,11 +26,26 @@ const FEWEST_VIEWS: usize = 8;
 /// Fewest columns of a frame.
 const FEWEST_COLUMNS: usize = 8;
 
+/// By how much the counts of a view differ from those of the views beside it at least to be told, %. In the real scan at
+/// hand and in simulated ones it is 4 at most.
+pub const ODD_VIEW_PERCENT: f64 = 12.0;
+
+/// A view whose counts are not those of the views beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OddView {
+    /// Its number, from 0.
+    pub view: usize,
+    /// How many more counts it has than the mean of those beside it, %.
+    pub percent: f64,
+}
+
 /// Where the detector was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// Its angle about the patient, degrees: 0 at the back, 90 at the left side.
     pub angle_deg: f64,
+    /// Its number in time, from 0. Views of several detectors at one time have the same.
+    pub time: usize,
 }
 
 /// The projections of one gate.
@@ -131,10 +146,40 @@ impl Projections {
         [self.columns, self.columns, self.rows]
     }
 
-    /// The counts of a view.
-    pub(super) fn view(&self, view: usize) -> &[f32] {
+    /// The counts of a view, rows from the head to the feet.
+    pub fn view(&self, view: usize) -> &[f32] {
         let pixels = self.rows * self.columns;
         &self.counts[view * pixels..(view + 1) * pixels]
+    }
+
+    /// The sum of the counts of a view.
+    pub fn counts_of(&self, view: usize) -> f64 {
+        self.view(view).iter().map(|count| f64::from(*count)).sum()
+    }
+
+    /// The view whose counts lie farthest from the mean of the views beside it, if that is more than
+    /// [`ODD_VIEW_PERCENT`]. Those at the ends of the arc have no two views beside them.
+    pub fn odd_view(&self) -> Option<OddView> {
+        let mut order: Vec<usize> = (0..self.views.len()).collect();
+        order.sort_by(|a, b| {
+            self.views[*a]
+                .angle_deg
+                .total_cmp(&self.views[*b].angle_deg)
+        });
+        let off = order.windows(3).map(|three| {
+            let [before, own, after] = [0, 1, 2].map(|n| self.counts_of(three[n]));
+            let usual = 0.5 * (before + after);
+            OddView {
+                view: three[1],
+                percent: if usual > 0.0 {
+                    100.0 * (own / usual - 1.0)
+                } else {
+                    0.0
+                },
+            }
+        });
+        let farthest = off.max_by(|a, b| a.percent.abs().total_cmp(&b.percent.abs()));
+        farthest.filter(|odd| odd.percent.abs() > ODD_VIEW_PERCENT)
     }
 }
 

@@ -50,7 +50,12 @@ impl Ball {
             columns: COLUMNS,
             rows: ROWS,
             pixel_mm: PIXEL_MM,
-            views: angles_deg.iter().map(|a| View { angle_deg: *a }).collect(),
+            views: (angles_deg.iter().enumerate())
+                .map(|(time, a)| View {
+                    angle_deg: *a,
+                    time,
+                })
+                .collect(),
         }
     }
 }
@@ -327,9 +332,9 @@ fn no_counts_make_an_empty_image() {
 #[test]
 fn what_no_volume_can_be_made_of_is_refused_before_any_work() {
     let views = |angles: Vec<f64>| -> Vec<View> {
-        angles
-            .into_iter()
-            .map(|angle_deg| View { angle_deg })
+        let views = angles.into_iter().enumerate();
+        views
+            .map(|(time, angle_deg)| View { angle_deg, time })
             .collect()
     };
     let half = views(turn(225.0, -180.0, 60));
@@ -370,4 +375,94 @@ fn subsets_divide_the_views_where_they_can() {
     ] {
         assert_eq!(how.subsets_of(views), subsets, "{views}");
     }
+}
+
+/// Two balls, the smaller one brighter: a heart and what lies below it.
+fn heart_and_gut(angles_deg: &[f64]) -> (Projections, Vec<f32>) {
+    let heart = Ball {
+        centre: [30.0, -25.0, 12.0],
+        radius_mm: 32.0,
+    };
+    let gut = Ball {
+        centre: [-20.0, 10.0, -38.0],
+        radius_mm: 24.0,
+    };
+    let mut all = heart.projections(angles_deg);
+    let below = gut.projections(angles_deg).counts;
+    let seen = all.counts.iter_mut().zip(below);
+    seen.for_each(|(count, below)| *count = 200.0 * *count + 500.0 * below);
+    let empty = vec![0.0; COLUMNS * COLUMNS * ROWS];
+    let share = voxels(&empty).map(|(at, _)| {
+        let off2: f64 = at
+            .iter()
+            .zip(heart.centre)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum();
+        if off2 < 38.0 * 38.0 { 1.0 } else { 0.0 }
+    });
+    let share = share.collect();
+    (all, share)
+}
+
+#[test]
+fn views_are_found_where_they_were_shifted_to() {
+    let (still, heart) = heart_and_gut(&turn(225.0, -180.0, 60));
+    let shift = |view: usize| motion::ViewShift {
+        along_mm: if view >= 24 { -10.0 } else { 0.0 },
+        across_mm: if (30..40).contains(&view) { 7.0 } else { 0.0 },
+    };
+    let known: Vec<motion::ViewShift> = (0..60).map(shift).collect();
+    let back: Vec<motion::ViewShift> = (known.iter())
+        .map(|shift| motion::ViewShift {
+            along_mm: -shift.along_mm,
+            across_mm: -shift.across_mm,
+        })
+        .collect();
+    let moved = motion::shifted_back(&still, &back);
+    let monitor = Monitor::silent();
+    let shifts = |projections: &Projections| {
+        let measured = motion::view_shifts(projections, 0.0, &heart, &monitor).unwrap();
+        measured.iter().map(|own| own.shift).collect::<Vec<_>>()
+    };
+    let (found, at_rest) = (shifts(&moved), shifts(&still));
+    let mut known = known;
+    motion::without_place(&moved.views, &mut known);
+    for (view, ((found, rest), known)) in found.iter().zip(&at_rest).zip(&known).enumerate() {
+        assert!(
+            (found.along_mm - known.along_mm).abs() < 1.0,
+            "{view}: {found:?} {known:?}"
+        );
+        assert!(
+            (found.across_mm - known.across_mm).abs() < 1.5,
+            "{view}: {found:?} {known:?}"
+        );
+        assert!(
+            rest.along_mm.abs() < 0.7 && rest.across_mm.abs() < 0.9,
+            "{view}: {rest:?}"
+        );
+    }
+}
+
+#[test]
+fn shifts_have_the_same_bytes_on_any_number_of_threads() {
+    let (projections, heart) = heart_and_gut(&turn(0.0, 360.0, 32));
+    let shifts = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap()
+            .install(|| motion::view_shifts(&projections, 0.0, &heart, &Monitor::silent()).unwrap())
+    };
+    assert_eq!(shifts(1), shifts(3));
+}
+
+#[test]
+fn a_view_of_other_counts_is_told() {
+    let mut projections = BIG.projections(&turn(225.0, -180.0, 60));
+    assert_eq!(projections.odd_view(), None);
+    let pixels = COLUMNS * ROWS;
+    projections.counts[17 * pixels..18 * pixels]
+        .iter_mut()
+        .for_each(|count| *count *= 0.7);
+    let odd = projections.odd_view().expect("one view");
+    assert_eq!(odd.view, 17);
+    assert!((odd.percent + 30.0).abs() < 1.0, "{}", odd.percent);
 }

@@ -1,6 +1,8 @@
 //! A caller's choice of a volume of a file, and the limits of a reader.
 
 use super::VolumeError;
+use crate::image::reconstruct::Reconstruction;
+use crate::image::reconstruct::motion::ViewShift;
 
 /// Which volume of the file to read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -28,6 +30,15 @@ impl ReadOptions {
             Some(frame) => Err(VolumeError::FrameOutOfRange { frame, frames }),
         }
     }
+}
+
+/// How volumes are made of projections.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FromProjections {
+    /// The reconstruction.
+    pub reconstruction: Reconstruction,
+    /// How far every view is shifted back, in the order of the reader's views; empty for not at all.
+    pub shifts: Vec<ViewShift>,
 }
 
 /// Upper bounds on what reading a file may cost.

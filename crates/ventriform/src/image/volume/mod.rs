@@ -94,16 +94,17 @@ pub use gate_files::order_by_numbers;
 pub use gate_names::{NamesSay, said_by_names};
 pub use gate_timing::{GateTiming, RR_MS};
 pub use gates::GatedReading;
-pub use limits::{ReadLimits, ReadOptions};
+pub use limits::{FromProjections, ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
 pub use provenance::Provenance;
 pub use read::{
     HeldGates, hold_gates, hold_same_voxels, inspect, labels_are_rounded, preview_files,
-    provenance, read, read_gates, read_segment, segments, surface, voxels_of_label,
+    provenance, read, read_gates, read_gates_with, read_segment, read_with, segments, surface,
+    voxels_of_label,
 };
-pub use reconstructed::{Reconstructed, reconstructed};
+pub use reconstructed::{Reconstructed, projections, reconstructed};
 pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;
 pub use summary::summarise;

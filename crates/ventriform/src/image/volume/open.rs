@@ -19,6 +19,7 @@ use crate::base::geometry::frame::{VOXEL_MM, VoxelToPatient};
 use crate::base::progress::Monitor;
 use crate::image::draw::Image;
 use crate::image::grid::gates::GATE_COUNTS;
+use crate::image::reconstruct::Projections;
 use crate::mesh::TriMesh;
 
 /// Above this size 32-bit floats do not tell all whole numbers apart.
@@ -176,6 +177,16 @@ pub(super) trait OpenVolume {
         _frames: &[usize],
         _monitor: &Monitor,
     ) -> Option<Result<Decoded, VolumeError>> {
+        None
+    }
+
+    /// The counts of these volumes together, as a camera acquired them; `None` unless the volumes are reconstructed
+    /// here.
+    fn projections(
+        &self,
+        _frames: &[usize],
+        _monitor: &Monitor,
+    ) -> Option<Result<Projections, VolumeError>> {
         None
     }
 

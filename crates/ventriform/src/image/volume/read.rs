@@ -8,7 +8,7 @@ use super::gate_look::{CalledBy, look, look_at};
 use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::judged_gates::judged;
-use super::limits::{ReadLimits, ReadOptions};
+use super::limits::{FromProjections, ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
 use super::source::{FOLDER, VolumeFile};
@@ -20,7 +20,6 @@ use super::{
 use crate::base::progress::Monitor;
 use crate::image::draw::Image;
 use crate::image::grid::gates::GATE_COUNTS;
-use crate::image::reconstruct::Reconstruction;
 use crate::mesh::TriMesh;
 use crate::mesh::files::MeshStatement;
 use std::cell::RefCell;
@@ -38,7 +37,21 @@ pub fn read(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
-    read_with_statements(files, options, limits, monitor).map(|(reading, _)| reading)
+    read_with(files, options, &FromProjections::default(), limits, monitor)
+}
+
+/// As [`read()`], with projections reconstructed as `from` says.
+///
+/// # Errors
+/// As [`read()`].
+pub fn read_with(
+    files: &[VolumeFile],
+    options: &ReadOptions,
+    from: &FromProjections,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Reading, VolumeError> {
+    read_with_statements(files, options, from, limits, monitor).map(|(reading, _)| reading)
 }
 
 /// What files say beside their volume.
@@ -53,13 +66,15 @@ struct Statements {
 fn read_with_statements(
     files: &[VolumeFile],
     options: &ReadOptions,
+    from: &FromProjections,
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<(Reading, Statements), VolumeError> {
+    let told = Told::of(from);
     // A volume that the caller chose is what it is.
     let mut opened = match options.frame {
-        Some(_) => open(files, limits, monitor)?,
-        None => open_judged(files, limits, monitor)?,
+        Some(_) => open_as(files, &told, limits, monitor)?,
+        None => open_judged(files, &told, limits, monitor)?,
     };
     let reading = open::read(&mut *opened.file, *options, monitor);
     let mut reading = reading.map_err(|error| error.with_path(files))?;
@@ -88,7 +103,22 @@ pub fn read_gates(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<GatedReading, VolumeError> {
-    let opened = open(files, limits, monitor);
+    read_gates_with(files, gated, &FromProjections::default(), limits, monitor)
+}
+
+/// As [`read_gates`], with projections reconstructed as `from` says.
+///
+/// # Errors
+/// As [`read_gates`].
+pub fn read_gates_with(
+    files: &[VolumeFile],
+    gated: bool,
+    from: &FromProjections,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<GatedReading, VolumeError> {
+    let told = Told::of(from);
+    let opened = open_as(files, &told, limits, monitor);
     // Files of one gate each are not one volume.
     let apart = (2..=*GATE_COUNTS.end()).contains(&files.len())
         && match &opened {
@@ -144,7 +174,7 @@ pub fn read_gates(
     let timings = opened.file.gate_timings();
     let mut look = look(&mut *opened.file, &CalledBy::Header, monitor)?;
     if !opened.file.reads_again() {
-        opened.file = open(files, limits, monitor)?.file;
+        opened.file = open_as(files, &told, limits, monitor)?.file;
     }
     let kept = (0..frames).filter(|frame| !look.left_out.extra.contains(frame));
     let kept: Vec<usize> = kept.collect();
@@ -194,7 +224,7 @@ pub fn hold_gates(
     let opened = if gated {
         open(files, limits, monitor)?
     } else {
-        open_judged(files, limits, monitor)?
+        open_judged(files, &Told::default(), limits, monitor)?
     };
     let header = opened.file.header();
     let gates = header.frames - opened.file.left_out().extra.len();
@@ -263,7 +293,13 @@ fn one_by_one(
     for (index, file) in files.iter().enumerate() {
         let part = monitor.part(index, files.len());
         let own = std::slice::from_ref(file);
-        let (reading, stated) = read_with_statements(own, &ReadOptions::default(), limits, &part)?;
+        let (reading, stated) = read_with_statements(
+            own,
+            &ReadOptions::default(),
+            &FromProjections::default(),
+            limits,
+            &part,
+        )?;
         let reading = reading.usable()?;
         said.extend(stated.scan);
         of_first.get_or_insert(stated.timings.into_iter().next());
@@ -387,7 +423,7 @@ pub fn provenance(
 ) -> Result<Option<Provenance>, VolumeError> {
     let file = match options.frame {
         Some(_) => open(files, limits, monitor)?.file,
-        None => open_judged(files, limits, monitor)?.file,
+        None => open_judged(files, &Told::default(), limits, monitor)?.file,
     };
     let header = file.header();
     let frame = options.choose(header.frames, header.gated);
@@ -409,7 +445,7 @@ pub fn inspect(
 ) -> Result<VolumeFacts, VolumeError> {
     let notes = RefCell::new(Vec::new());
     let again = || {
-        let opened = open_judged(files, limits, monitor)?;
+        let opened = open_judged(files, &Told::default(), limits, monitor)?;
         notes.replace(opened.notes);
         Ok(opened.file)
     };
@@ -440,12 +476,21 @@ pub(super) struct Opened {
 }
 
 /// What a caller tells of files that are no volumes yet.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Told {
     /// Of a mesh.
     pub(super) mesh: MeshStatement,
-    /// How projections are reconstructed.
-    pub(super) how: Reconstruction,
+    /// How volumes are made of projections.
+    pub(super) from: FromProjections,
+}
+
+impl Told {
+    pub(super) fn of(from: &FromProjections) -> Self {
+        Self {
+            from: from.clone(),
+            ..Self::default()
+        }
+    }
 }
 
 /// Recognises the format of `files` and checks the header. Archives stand for the files in them.
@@ -460,11 +505,12 @@ fn open(
 /// As [`open()`], with the volumes that are taken for gates looked at.
 fn open_judged(
     files: &[VolumeFile],
+    told: &Told,
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
-    let opened = open(files, limits, monitor)?;
-    let again = || Ok(open(files, limits, monitor)?.file);
+    let opened = open_as(files, told, limits, monitor)?;
+    let again = || Ok(open_as(files, told, limits, monitor)?.file);
     Ok(Opened {
         file: judged(opened.file, again, monitor)?,
         notes: opened.notes,
@@ -510,7 +556,7 @@ fn open_named(
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
         Recognised::Gates(files) => Box::new(GateFiles::open(&files, limits)?),
-        Recognised::Dicom(files) => Box::new(DicomFile::open(&files, &told.how, limits, monitor)?),
+        Recognised::Dicom(files) => Box::new(DicomFile::open(&files, &told.from, limits, monitor)?),
         Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, &told.mesh, limits, monitor)?),
         Recognised::Arrays(file) => Box::new(ArrayFile::open(file, limits)?),
     };

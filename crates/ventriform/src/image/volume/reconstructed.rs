@@ -3,13 +3,13 @@
 
 use super::gates::GatedReading;
 use super::left_out::LeftOut;
-use super::limits::{ReadLimits, ReadOptions};
+use super::limits::{FromProjections, ReadLimits, ReadOptions};
 use super::open::{self, Reading};
 use super::read::{Told, open_as};
 use super::source::VolumeFile;
 use super::{FileFormat, Provenance, Volume, VolumeError, VolumeFacts};
 use crate::base::progress::Monitor;
-use crate::image::reconstruct::Reconstruction;
+use crate::image::reconstruct::{Projections, Reconstruction};
 
 /// What was reconstructed of the projections in a file.
 #[derive(Debug, Clone)]
@@ -24,6 +24,32 @@ pub struct Reconstructed {
     pub provenance: Option<Provenance>,
 }
 
+/// The counts in `files` as the camera acquired them: of the volume `frame`, or of all gates together. `None` if the files
+/// hold no projections.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn projections(
+    files: &[VolumeFile],
+    frame: Option<usize>,
+    how: &Reconstruction,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Option<Projections>, VolumeError> {
+    let opened = open_as(files, &told(how), limits, monitor)?;
+    let all: Vec<usize> = (0..opened.file.header().frames).collect();
+    let frames = frame.map_or(all, |frame| vec![frame]);
+    let counts = opened.file.projections(&frames, monitor).transpose();
+    counts.map_err(|error| error.with_path(files))
+}
+
+fn told(how: &Reconstruction) -> Told {
+    Told::of(&FromProjections {
+        reconstruction: *how,
+        ..FromProjections::default()
+    })
+}
+
 /// Reconstructs the projections in `files` as `how` says: every gate, or one volume of the counts of all gates if
 /// `summed`.
 ///
@@ -36,11 +62,7 @@ pub fn reconstructed(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reconstructed, VolumeError> {
-    let told = Told {
-        how: *how,
-        ..Told::default()
-    };
-    let mut opened = open_as(files, &told, limits, monitor)?;
+    let mut opened = open_as(files, &told(how), limits, monitor)?;
     let header = opened.file.header();
     if header.format != FileFormat::DicomProjections {
         return Err(VolumeError::NotSlices {

@@ -35,6 +35,7 @@ mod model_page;
 mod model_report;
 mod page_parts;
 mod perfusion_report;
+mod projections_report;
 mod raised_flag;
 mod sections;
 mod segmentation_page;
@@ -68,6 +69,7 @@ pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;
 pub use model_report::{ModelReport, ReportInput};
 pub use perfusion_report::{PerfusionReport, SegmentScore, TerritoryScore};
+pub use projections_report::{MoveReport, ProjectionsReport, UncorrectedReport, ViewReport};
 pub use raised_flag::RaisedFlag;
 pub use sections::{
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,

@@ -2,10 +2,12 @@
 
 use super::embedded::Embedded;
 use super::page_parts::{flags_headline, limits_hint, normal_limits, short, volume_line};
+use super::projections_report::{MoveReport, ProjectionsReport, UncorrectedReport, ViewReport};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
 use super::whose;
+use crate::image::draw::chart::{self, Series};
 use crate::image::draw::document::{self, HtmlDocument};
 use crate::image::draw::table::{CellKind, Table, TableColumn};
 use crate::image::draw::text::{data_uri, number};
@@ -36,6 +38,8 @@ pub struct SegmentationPage<'a> {
     pub polar_map: Option<&'a Value>,
     /// The scan about the organ, a packed NIfTI file.
     pub region: Option<&'a [u8]>,
+    /// Views, sinogram and linogram of the projections: a PNG of three pictures side by side.
+    pub projections: Option<&'a [u8]>,
     /// Whose scan it is, as far as the page is to name it.
     pub scan: Option<&'a Provenance>,
 }
@@ -56,6 +60,7 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
             @if let Some(png) = page.slices { (slices(report, png, page.region.is_some())) }
             @if let Some(svg) = page.polar { (polar(report, svg)) }
             (normal_limits(report.perfusion.as_ref()))
+            @if let Some(own) = &report.projections { (projections(own, page.projections)) }
             (agreement(report))
             (views::section("The fitted model", page.mesh, page.uncertainty, !shows_scan(page)))
             (candidates(report))
@@ -274,6 +279,88 @@ pub(super) fn slice_names(report: &SegmentationReport) -> (&'static str, [&'stat
 }
 
 /// The slices as a picture; `touched` if the script draws them with the scan, which is without the expert's mask.
+/// The projections: pictures, the heart's motion, and what a correction changed.
+fn projections(own: &ProjectionsReport, png: Option<&[u8]>) -> Markup {
+    let line = |label: &str, class, thin, of: fn(&ViewReport) -> Option<f64>| Series {
+        label: label.into(),
+        class,
+        thin,
+        points: (own.views.iter().enumerate())
+            .filter_map(|(number, view)| Some((number as f64 + 1.0, of(view)?)))
+            .collect(),
+    };
+    let moved = [
+        line("along", "red", false, |view| view.moved_along_mm),
+        line("across", "blue", false, |view| view.moved_across_mm),
+        line("along, measured", "orange", true, |view| view.along_mm),
+        line("across, measured", "faint", true, |view| view.across_mm),
+    ];
+    let most = own.views.iter().map(|view| view.counts).fold(1.0, f64::max);
+    let relative = Series {
+        label: "counts".into(),
+        class: "blue",
+        thin: false,
+        points: (own.views.iter().enumerate())
+            .map(|(number, view)| (number as f64 + 1.0, 100.0 * view.counts / most))
+            .collect(),
+    };
+    html! {
+        section {
+            h2 { "Projections" }
+            p.hint {
+                (own.views.len()) " views, " (number(own.counts / 1e6, 2)) " million counts. "
+                @match own.moved {
+                    None => "The heart's motion was not measured.",
+                    Some(false) => "The heart did not move by more than the projections can tell: steps of some 5 mm, \
+                                    drifts of 10 mm.",
+                    Some(true) => {
+                        "The heart moved: "
+                        (own.moves.iter().map(MoveReport::text).collect::<Vec<_>>().join("; ")) "."
+                    }
+                }
+            }
+            @if let Some(png) = png {
+                figure.slices {
+                    img src=(data_uri("image/png", png))
+                        alt="Views of the camera, sinogram and linogram";
+                    figcaption { span { "views" } span { "sinogram at the heart" } span { "linogram" } }
+                }
+            }
+            @if own.moved.is_some() {
+                (chart::lines("How far the heart lay from its mean place, mm", "view", &moved))
+            }
+            (chart::lines("Counts, % of the greatest", "view", &[relative]))
+            @if let Some(before) = &own.uncorrected { (correction(before)) }
+        }
+    }
+}
+
+/// What a correction of motion changed.
+fn correction(before: &UncorrectedReport) -> Markup {
+    let text = |value: &Option<f64>| value.map_or_else(|| "–".into(), |value| number(value, 1));
+    let segment = |(n, (own, change)): (usize, (&Option<f64>, &Option<f64>))| {
+        vec![(n + 1).to_string(), text(own), text(change)]
+    };
+    let rows = (before.segments_percent.iter().zip(&before.segments_change)).enumerate();
+    let table = Table {
+        columns: vec![
+            TableColumn::number("segment"),
+            TableColumn::number("before, %"),
+            TableColumn::number("change, points"),
+        ],
+        rows: rows.map(segment).collect(),
+    };
+    html! {
+        h3 { "Before the views were shifted back" }
+        p.hint {
+            "Confidence " (number(before.confidence, 2)) ", wall " (number(before.wall_ml, 0)) " ml"
+            @if let Some(ml) = before.cavity_ml { ", cavity " (number(ml, 0)) " ml" }
+            "."
+        }
+        (document::table(&table, "Uptake before the views were shifted back"))
+    }
+}
+
 fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
     let (about, names) = slice_names(report);
     html! {
@@ -499,6 +586,7 @@ mod tests {
             polar: None,
             polar_map: None,
             region: None,
+            projections: None,
             scan: None,
         })
     }

@@ -11,6 +11,7 @@ use super::fit_report::{
 use super::input::FileFacts;
 use super::json_number::{or_nan, round};
 use super::perfusion_report::PerfusionReport;
+use super::projections_report::ProjectionsReport;
 use super::raised_flag::RaisedFlag;
 use crate::base::geometry::Vec3;
 use crate::heart::judge::Fit;
@@ -63,6 +64,9 @@ pub struct SegmentationReport {
     pub polar: Option<PolarSummary>,
     /// The wall's uptake beside normal limits, if some were given.
     pub perfusion: Option<PerfusionReport>,
+    /// The projections that slices were reconstructed of, if they were reconstructed here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub projections: Option<ProjectionsReport>,
     /// Reasons to look closer.
     pub flags: Vec<RaisedFlag>,
     /// Which voxels the mask holds.
@@ -186,6 +190,8 @@ pub struct SegmentationParts {
     pub polar: Option<PolarSummary>,
     /// The wall's uptake beside normal limits.
     pub perfusion: Option<PerfusionReport>,
+    /// The projections that slices were reconstructed of.
+    pub projections: Option<ProjectionsReport>,
     /// Every parameter by its name, defaults written out.
     pub parameters: Map<String, Value>,
     /// Facts about the volume's file.
@@ -232,6 +238,7 @@ impl SegmentationReport {
             measures: parts.measures,
             polar: parts.polar,
             perfusion: parts.perfusion,
+            projections: parts.projections,
             flags: (judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),

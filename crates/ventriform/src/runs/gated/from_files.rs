@@ -7,7 +7,7 @@ use crate::heart::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedS
 use crate::heart::deform::WallSurface;
 use crate::heart::normals::{HeartFigure, Perfusion};
 use crate::heart::polar::SEGMENT_NAMES;
-use crate::image::volume::{GatedReading, ReadLimits, Volume, read_gates};
+use crate::image::volume::{FromProjections, GatedReading, ReadLimits, Volume, read_gates_with};
 use crate::mesh::TriMesh;
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::results::report::{
@@ -15,7 +15,8 @@ use crate::results::report::{
     SegmentationReport,
 };
 use crate::runs::segmentation::{
-    Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare, segment,
+    Acquired, Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare,
+    segment, uncorrected,
 };
 
 /// The beat of a study with what it was made from.
@@ -60,25 +61,36 @@ pub fn from_files(
             greatest,
         });
     }
-    let mut reading = read_gates(order.gates, order.choice.gated, limits, monitor)?;
-    let study = GatedStudy::new(std::mem::take(&mut reading.gates), &reading.lost, monitor)?;
     let parameters = order.parameters.clone();
-    let fit = SegmentationParameters {
-        deform: parameters
-            .on(
-                &study.sum,
-                reading.facts.affine_source,
-                reading.provenance(),
-            )
-            .map_err(crate::runs::segmentation::SegmentationError::from)?,
-        polar: parameters.polar,
-        kept_model: parameters.kept_model.clone(),
-        segments_from: parameters.segments_from,
-        reader: None,
+    let from = FromProjections {
+        reconstruction: parameters.reconstruction,
+        ..FromProjections::default()
     };
-    let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
-    let mut segmentation = segment(&study.sum, &templates, &fit, None, monitor)?;
-    segmentation.refused.splice(0..0, refused);
+    let mut fitted = fitted_sum(order, &from, limits, monitor)?;
+    let acquired = Acquired::of_files(
+        order.gates,
+        fitted.reading.facts.format,
+        &parameters,
+        (&fitted.segmentation.fit.model, &fitted.study.sum),
+        limits,
+        monitor,
+    )?;
+    if let Some(mut acquired) = acquired {
+        let shifted = acquired.corrected(&parameters);
+        if let Some(shifted) = shifted.filter(|_| parameters.correct_motion) {
+            let after = fitted_sum(order, &shifted, limits, monitor)?;
+            let before = std::mem::replace(&mut fitted, after);
+            let change = uncorrected(&before.segmentation, &fitted.segmentation);
+            acquired.uncorrected = Some(change);
+        }
+        let flags = &mut fitted.segmentation.fit.judgement.flags;
+        *flags = acquired.judged(std::mem::take(flags));
+    }
+    let FittedSum {
+        mut reading,
+        study,
+        segmentation,
+    } = fitted;
     let model = &segmentation.fit.model;
     let surfaces = model.surfaces.as_ref().ok_or(BeatError::NoVentricle)?;
     let wall = surfaces.anatomical.clone();
@@ -117,6 +129,46 @@ pub fn from_files(
         parameters,
         choice: order.choice,
         rr_ms,
+        segmentation,
+    })
+}
+
+/// The gates' sum and its segmentation.
+struct FittedSum {
+    reading: GatedReading,
+    study: GatedStudy,
+    segmentation: Segmentation,
+}
+
+/// The segmentation of the sum of gates that are made as `from` says.
+fn fitted_sum(
+    order: &GatedOrder<'_>,
+    from: &FromProjections,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<FittedSum, GatedError> {
+    let parameters = order.parameters;
+    let mut reading = read_gates_with(order.gates, order.choice.gated, from, limits, monitor)?;
+    let study = GatedStudy::new(std::mem::take(&mut reading.gates), &reading.lost, monitor)?;
+    let fit = SegmentationParameters {
+        deform: parameters
+            .on(
+                &study.sum,
+                reading.facts.affine_source,
+                reading.provenance(),
+            )
+            .map_err(crate::runs::segmentation::SegmentationError::from)?,
+        polar: parameters.polar,
+        kept_model: parameters.kept_model.clone(),
+        segments_from: parameters.segments_from,
+        reader: None,
+    };
+    let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
+    let mut segmentation = segment(&study.sum, &templates, &fit, None, monitor)?;
+    segmentation.refused.splice(0..0, refused);
+    Ok(FittedSum {
+        reading,
+        study,
         segmentation,
     })
 }

@@ -34,6 +34,8 @@ const APPARENT_MASK: &str = "mask_apparent.nii.gz";
 const LABELS_FILE: &str = "labels.nii.gz";
 /// The same for 3D Slicer.
 const SEGMENTS_FILE: &str = "labels.seg.nrrd";
+/// Views, sinogram and linogram of the projections that the slices were reconstructed of.
+const PROJECTIONS_FILE: &str = "projections.png";
 /// The scan about the organ, which the page shows.
 const REGION_FILE: &str = "region.nii.gz";
 
@@ -124,6 +126,12 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: self.segmentation.slices.clone(),
         });
+        if let Some(acquired) = &self.acquired {
+            files.push(png_file(
+                PROJECTIONS_FILE,
+                acquired.picture(&fit.model, monitor)?,
+            ));
+        }
         files.push(region_file(
             REGION_FILE,
             &self.reading.volume,
@@ -237,6 +245,7 @@ impl SegmentedVolume {
             polar: bytes("polar.svg"),
             polar_map: map.as_ref(),
             region: bytes(REGION_FILE),
+            projections: bytes(PROJECTIONS_FILE),
             scan,
         });
         NamedFile {

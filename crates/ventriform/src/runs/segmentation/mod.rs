@@ -17,11 +17,14 @@
 //!    judge the chosen one together ([`consensus`](crate::heart::judge::consensus)).
 //! 6. With a reader's profile, the wall is drawn as that reader would ([`crate::heart::reader`]).
 //! 7. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
-//! 8. [`SegmentedVolume::report`] is the report; [`SegmentedVolume::files`] are the files written, the same on
+//! 8. Of slices that were reconstructed here, [`Acquired`] measures the heart's motion in the projections; if it is to be
+//!    corrected, the views are shifted back, and all is made again.
+//! 9. [`SegmentedVolume::report`] is the report; [`SegmentedVolume::files`] are the files written, the same on
 //!    the command line and over HTTP.
 
 mod order;
 
+mod acquired;
 mod from_files;
 
 pub mod built_in;
@@ -43,6 +46,7 @@ mod region;
 
 mod error;
 
+pub use acquired::Acquired;
 pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
@@ -51,6 +55,7 @@ pub(crate) use files::{
     uptake_files,
 };
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
+pub(crate) use from_files::uncorrected;
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use normals::{heart_figures, judged_by_normals};

@@ -1,5 +1,6 @@
 //! From a segmentation to its report.
 
+use super::acquired::Acquired;
 use super::from_files::SegmentedVolume;
 use super::segment::Segmentation;
 use crate::heart::polar::{PolarMap, PolarSummary};
@@ -40,6 +41,7 @@ impl SegmentedVolume {
                 .map(|map| self.polar_summary(map)),
             perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
                 .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
+            projections: self.acquired.as_ref().map(Acquired::report),
             parameters: self.parameters.to_json(),
             input: FileFacts::from_facts(&self.reading.facts),
             warnings: self.warnings(),

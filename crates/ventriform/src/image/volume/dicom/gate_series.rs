@@ -11,11 +11,12 @@
 //! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that gates are moments of one
 //! beat; a fit tells ([`crate::heart::beat`]), and a warning says what was taken for what.
 
+use super::super::limits::FromProjections;
 use super::one_scan::{Reach, ScanStatement, contradiction};
 use super::{Content, DicomFile, ScannedFile, StoredSlice, VolumeError, timing};
 use crate::base::progress::Monitor;
 use crate::image::grid::gates::{GATE_COUNTS, SAME_PLACE_MM};
-use crate::image::reconstruct::Reconstruction;
+
 use crate::image::volume::gate_timing::GateTiming;
 use crate::image::volume::limits::ReadLimits;
 use crate::image::volume::source::VolumeFile;
@@ -128,7 +129,7 @@ pub(super) fn open(
         }
         places.push(Place::from_attributes(a));
         said.push(ScanStatement::from_attributes(a));
-        let gate = DicomFile::of_scan(file, scanned, &Reconstruction::default(), limits)?;
+        let gate = DicomFile::of_scan(file, scanned, &FromProjections::default(), limits)?;
         if gate.volumes != 1 {
             return Ok(Joined::No);
         }

@@ -55,14 +55,14 @@ use self::stored::StoredDataSet;
 use super::decode::{DataType, Figures};
 use super::facts::{FileFormat, LengthUnit};
 use super::gate_timing::GateTiming;
-use super::limits::ReadLimits;
+use super::limits::{FromProjections, ReadLimits};
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
 use super::{Provenance, Segment, VolumeError};
 use crate::base::progress::{Monitor, Stage};
 use crate::image::grid::gates::GATE_COUNTS;
-use crate::image::reconstruct::Reconstruction;
+use crate::image::reconstruct::Projections;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::mem;
@@ -151,7 +151,7 @@ impl DicomFile {
     /// Reads and checks the attributes of `files`, of which there is at least one.
     pub(super) fn open(
         files: &[&VolumeFile],
-        how: &Reconstruction,
+        from: &FromProjections,
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
@@ -160,7 +160,7 @@ impl DicomFile {
         files.sort_by(|a, b| a.name().cmp(b.name()));
         let sorted = company::set_apart(&files, limits, monitor)?;
         let mut opened = match &sorted.slices[..] {
-            [file] => Self::single(file, how, limits, monitor)?,
+            [file] => Self::single(file, from, limits, monitor)?,
             slices => match gate_series::open(slices, limits, monitor)? {
                 Joined::Gates(gates) => *gates,
                 Joined::Contradiction(reason) => return Err(not_one(slices.len(), reason)),
@@ -173,19 +173,19 @@ impl DicomFile {
 
     fn single(
         file: &VolumeFile,
-        how: &Reconstruction,
+        from: &FromProjections,
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
         let scanned = ScannedFile::open(file, limits, monitor)?;
-        Self::of_scan(file, scanned, how, limits)
+        Self::of_scan(file, scanned, from, limits)
     }
 
     /// The volumes of one file.
     fn of_scan(
         file: &VolumeFile,
         scanned: ScannedFile,
-        how: &Reconstruction,
+        from: &FromProjections,
         limits: &ReadLimits,
     ) -> Result<Self, VolumeError> {
         let ScannedFile { scan, pixels } = scanned;
@@ -214,7 +214,7 @@ impl DicomFile {
                 (Content::Slices(stored), volumes, slices, placement)
             }
             Kind::Projections { gated } => {
-                let raw = Acquisition::new(a, &pixels, gated, how, &mut warnings)?;
+                let raw = Acquisition::new(a, &pixels, gated, from, &mut warnings)?;
                 let placement = raw.placement(a)?;
                 let (volumes, slices) = (raw.gates(), rows);
                 (Content::Projections(raw), volumes, slices, placement)
@@ -1007,6 +1007,18 @@ impl OpenVolume for DicomFile {
                 warnings,
             }
         }))
+    }
+
+    fn projections(
+        &self,
+        frames: &[usize],
+        monitor: &Monitor,
+    ) -> Option<Result<Projections, VolumeError>> {
+        let Content::Projections(raw) = &self.content else {
+            return None;
+        };
+        let counts = raw.counts(&self.parts[0], frames, monitor);
+        Some(counts.map(|(projections, _)| projections))
     }
 
     fn decode_all(

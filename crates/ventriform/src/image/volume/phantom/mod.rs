@@ -12,7 +12,7 @@
 //! 5. A second Gaussian blur: the reconstruction filter, which correlates the noise.
 //!
 //! Steps 2 to 5 replace projection and reconstruction. Resolution and texture of the noise are
-//! realistic; attenuation and scatter are not modelled.
+//! realistic; attenuation and scatter are not modelled. [`phantom_projections`] makes the projections themselves.
 //!
 //! Guaranteed: the same parameters give the same voxels on any number of threads.
 
@@ -21,10 +21,12 @@ mod healthy;
 mod motion;
 mod parameters;
 mod poisson;
+mod views;
 
 pub use anatomy::HeartPose;
 pub use healthy::{HealthyPerson, healthy_person};
 pub use parameters::{PerfusionDefect, PhantomError, PhantomParameters, UptakeVariation};
+pub use views::{VIEW_COUNT, phantom_projections};
 
 use self::anatomy::Anatomy;
 use super::Volume;

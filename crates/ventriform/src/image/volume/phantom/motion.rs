@@ -58,7 +58,7 @@ pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
 }
 
 /// The voxels moved along k, linearly interpolated.
-fn displaced(voxels: &[f32], shape: [usize; 3], slices: f64) -> Vec<f32> {
+pub(super) fn displaced(voxels: &[f32], shape: [usize; 3], slices: f64) -> Vec<f32> {
     let slice = shape[0] * shape[1];
     let last = shape[2] as f64 - 1.0;
     (0..shape[2])

@@ -163,6 +163,9 @@ pub enum PhantomError {
         /// Size that the heart needs, mm.
         needed_mm: f64,
     },
+    /// A camera that turns needs cubes, and as many of them along i as along j.
+    #[error("projections need voxels that are cubes, and as many of them along i as along j")]
+    NoCubes,
     /// The caller cancelled the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -8,7 +8,8 @@
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
 //!    `measurements` with `normals`, `capture`).
-//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest
+//! 4. [`nuclear_image`]: slices that were reconstructed here.
+//! 5. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest
 //!    and stress: a report and pictures.
 //!
 //! The picture of a page names patient and study in its pixels (Burned In Annotation YES), unless the scan is freed of
@@ -32,6 +33,7 @@ mod codes;
 mod comparison;
 mod measurements;
 mod normals;
+mod nuclear;
 mod segmentation;
 mod source;
 mod stl;
@@ -46,10 +48,12 @@ pub use crate::image::volume::is_uid;
 pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use comparison::{ComparisonObject, DicomComparison};
+pub use nuclear::{nuclear_image, nuclear_projections};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use ventriform_dicom::write::data_set::{
     IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start,
 };
+pub use ventriform_dicom::write::uid::derived as derived_uid;
 
 use self::codes::{ANATOMICAL_STRUCTURE, DEFORMABLE_MODELS};
 use super::ExportError;

@@ -59,13 +59,14 @@ pub(super) fn runs(a: &Attributes, order: &ViewOrder) -> Result<Vec<Run>, ReadEr
         for rotation in 0..order.rotations() {
             let Rotation { step_deg, sign } = Rotation::new(a, rotation, order)?;
             let first = start + later_start(a, rotation)?;
-            let angle = |view: usize| View {
-                angle_deg: first + sign * step_deg * view as f64,
+            let view = |number: usize| View {
+                angle_deg: first + sign * step_deg * number as f64,
+                time: rotation * order.views() + number,
             };
             runs.push(Run {
                 detector,
                 rotation,
-                views: (0..order.views()).map(angle).collect(),
+                views: (0..order.views()).map(view).collect(),
                 sign,
             });
         }

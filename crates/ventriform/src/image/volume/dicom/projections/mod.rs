@@ -22,6 +22,7 @@ mod windows;
 use super::super::VolumeError;
 use super::super::decode::Figures;
 use super::super::facts::AffineSource;
+use super::super::limits::FromProjections;
 use super::super::open::Placement;
 use super::geometry::pixel_spacing;
 use super::pixels::Pixels;
@@ -29,6 +30,7 @@ use super::posture;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::base::progress::{Monitor, Stage};
+use crate::image::reconstruct::motion::shifted_back;
 use crate::image::reconstruct::{Projections, ProjectionsError, Reconstruction, View, reconstruct};
 use ventriform_dicom::read::attributes::{
     Attribute, Attributes, CENTRE_OF_ROTATION, COLLIMATOR_TYPE, CORRECTED_IMAGE,
@@ -58,7 +60,7 @@ pub(super) struct Acquisition {
     pixel_mm: f64,
     /// Whether rows run to the head.
     from_feet: bool,
-    how: Reconstruction,
+    from: FromProjections,
     /// Degrees that the views cover.
     pub arc_deg: f64,
 }
@@ -73,7 +75,7 @@ impl Acquisition {
         a: &Attributes,
         pixels: &Pixels,
         gated: bool,
-        how: &Reconstruction,
+        from: &FromProjections,
         warnings: &mut Vec<String>,
     ) -> Result<Self, VolumeError> {
         let order = ViewOrder::new(a, pixels.frames, gated, warnings)?;
@@ -81,7 +83,12 @@ impl Acquisition {
         for detector in 0..order.detectors() {
             check_detector(a, detector, warnings)?;
         }
-        let window = windows::chosen(a, order.windows(), how.energy_window, warnings)?;
+        let window = windows::chosen(
+            a,
+            order.windows(),
+            from.reconstruction.energy_window,
+            warnings,
+        )?;
         let runs = angles::runs(a, &order)?;
         let views: Vec<View> = runs
             .iter()
@@ -118,7 +125,7 @@ impl Acquisition {
             rows,
             pixel_mm,
             from_feet,
-            how: *how,
+            from: from.clone(),
         })
     }
 
@@ -150,19 +157,23 @@ impl Acquisition {
                  correction of attenuation, scatter and the collimator's resolution. The origin is the middle of the \
                  axis of rotation.",
                 self.views.len(),
-                self.how.method_text(self.views.len()),
-                self.how.filter_text()
+                self.how().method_text(self.views.len()),
+                self.how().filter_text()
             )],
         })
     }
 
     /// The method and the filter, for the header of what is made.
     pub(super) fn derivation(&self) -> [String; 2] {
-        let method = self.how.method_text(self.views.len());
+        let method = self.how().method_text(self.views.len());
         [
             format!("reconstructed here: {method}"),
-            self.how.filter_text(),
+            self.how().filter_text(),
         ]
+    }
+
+    fn how(&self) -> &Reconstruction {
+        &self.from.reconstruction
     }
 
     /// The volume of the counts of `gates` together, and warnings about them; `coarse` for a quick look.
@@ -176,13 +187,17 @@ impl Acquisition {
         coarse: bool,
         monitor: &Monitor,
     ) -> Result<(Vec<f32>, Vec<String>), VolumeError> {
-        let (projections, warnings) = self.counts(pixels, gates, monitor)?;
-        let how = if coarse { self.how.coarse() } else { self.how };
+        let (mut projections, warnings) = self.counts(pixels, gates, monitor)?;
+        if self.from.shifts.len() == self.views.len() {
+            projections = shifted_back(&projections, &self.from.shifts);
+        }
+        let how = *self.how();
+        let how = if coarse { how.coarse() } else { how };
         Ok((reconstruct(&projections, &how, monitor)?, warnings))
     }
 
-    /// The counts of `gates` together.
-    fn counts(
+    /// The counts of `gates` together, as the camera acquired them.
+    pub(super) fn counts(
         &self,
         pixels: &Pixels,
         gates: &[usize],
