@@ -1156,6 +1156,24 @@ class ModelReport(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class MoveReport(Document):
+    """One movement of the heart."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    back_mm: float
+    """To the back of the patient, mm."""
+    from_time: int | None = None
+    """Number in time of the first view after a step, from 1."""
+    head_mm: float
+    """Towards the head, mm."""
+    kind: str
+    """`step`, or `drift` over the whole scan."""
+    left_mm: float
+    """To the left of the patient, mm."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class NoBeat(Document):
     """A scan of which no beat could be compared."""
 
@@ -1515,6 +1533,28 @@ class Problem(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class ProjectionsReport(Document):
+    """The projections that slices were reconstructed of, and the heart's motion in them."""
+
+    _built: ClassVar[dict[str, str]] = {"moves": "MoveReport[]", "uncorrected": "UncorrectedReport", "views": "ViewReport[]"}
+
+    counts: float
+    """Counts of all views."""
+    moved: bool | None = None
+    """Whether the heart moved; `null` if that was not measured."""
+    moves: list[MoveReport]
+    """How it moved."""
+    pixel_mm: float
+    """Edge of a pixel, mm."""
+    range_mm: list[float] | None = None
+    """The greatest distance between its places in two views, mm: along the table, and across it on the detector."""
+    uncorrected: UncorrectedReport | None = None
+    """What the fit gave before the views were shifted back; `null` if they were not."""
+    views: list[ViewReport]
+    """The views, in the order in which the camera turned."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class RatesReport(Document):
     """How fast the ventricle empties and fills."""
 
@@ -1738,7 +1778,7 @@ class SegmentScore(Document):
 class SegmentationReport(Document):
     """The report of a segmentation. Lengths are millimetres in the patient frame LPS."""
 
-    _built: ClassVar[dict[str, str]] = {"candidates": "Candidate[]", "evidence": "Evidence", "fit": "Fit", "flags": "Flag[]", "input": "FileFacts", "localisation": "Localisation", "measures": "Agreement", "perfusion": "Perfusion", "polar": "PolarSummary", "posture": "Posture", "reader": "AppliedReader", "refused": "RefusedTemplate[]", "resolution_mm": "Resolution", "thickness_mm": "Thicknesses", "uncertainty_mm": "Uncertainties", "volumes_ml": "FittedVolumes"}
+    _built: ClassVar[dict[str, str]] = {"candidates": "Candidate[]", "evidence": "Evidence", "fit": "Fit", "flags": "Flag[]", "input": "FileFacts", "localisation": "Localisation", "measures": "Agreement", "perfusion": "Perfusion", "polar": "PolarSummary", "posture": "Posture", "projections": "ProjectionsReport", "reader": "AppliedReader", "refused": "RefusedTemplate[]", "resolution_mm": "Resolution", "thickness_mm": "Thicknesses", "uncertainty_mm": "Uncertainties", "volumes_ml": "FittedVolumes"}
 
     candidates: list[Candidate]
     """Models that were fitted."""
@@ -1770,6 +1810,8 @@ class SegmentationReport(Document):
     """Uptake of the wall; ventricles only."""
     posture: Posture | None = None
     """Which way is up in the patient."""
+    projections: ProjectionsReport | None = None
+    """The projections that slices were reconstructed of, if they were reconstructed here."""
     reader: AppliedReader | None = None
     """The reader's profile that the shown wall was drawn by."""
     refused: list[RefusedTemplate]
@@ -2079,6 +2121,24 @@ class Uncertainty(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class UncorrectedReport(Document):
+    """What a fit gave before views were shifted back."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    cavity_ml: float | None = None
+    """Volume of the cavity, ml."""
+    confidence: float
+    """Confidence."""
+    segments_change: list[float | None]
+    """What each segment gained by the correction, points."""
+    segments_percent: list[float | None]
+    """Uptake of the 17 segments, % of the reference."""
+    wall_ml: float
+    """Volume of the wall, ml."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Valence(Document):
     """Numbers of edges that meet at a vertex."""
 
@@ -2090,6 +2150,28 @@ class Valence(Document):
     """Share of vertices with five, six or seven."""
     share_6: float
     """Share of vertices with six edges, the regular case."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ViewReport(Document):
+    """One view."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    across_mm: float | None = None
+    """How far towards higher columns of the detector, mm."""
+    along_mm: float | None = None
+    """How far towards the head the heart lay from its mean place, mm, as measured in this view alone."""
+    angle_deg: float
+    """Angle of the detector about the patient, degrees: 0 at the back, 90 at the left side."""
+    counts: float
+    """Counts."""
+    moved_across_mm: float | None = None
+    """The second by the moves that are told, mm."""
+    moved_along_mm: float | None = None
+    """The first by the moves that are told, mm."""
+    time: int
+    """Number in time, from 1; views of several detectors at one time have the same."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -2214,11 +2296,11 @@ register(
     ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, ExcludedCase, FigureBeside, FileFacts, Fit,
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes,
     Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks,
-    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, NoBeat,
-    NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport,
-    PolarAttenuation, PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets,
-    RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport,
-    Shape, Smoothness, Software, Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory,
-    TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume,
-    VolumeFile, VolumeIntervals, VolumeLinks, WallVolumes,
+    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, MoveReport,
+    NoBeat, NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion,
+    PhaseReport, PolarAttenuation, PolarMap, PolarSegment, PolarSummary, Posture, Problem, ProjectionsReport,
+    RatesReport, ReaderOffsets, RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport,
+    SegmentScore, SegmentationReport, Shape, Smoothness, Software, Specificity, Start, Summary, SurfaceNoise,
+    SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty,
+    UncorrectedReport, Valence, ViewReport, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks, WallVolumes,
 )
