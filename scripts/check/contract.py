@@ -469,6 +469,10 @@ def everything(walk, folder):
         "post", "/v1/segmentations", expect=202, query="?edge=anatomical", body=body, headers={"content-type": kind}
     )
     anatomical = wait(walk, job)["segmentation"]
+    raw = open(os.path.join(folder, "raw.dcm"), "rb").read()
+    query = "?correct_motion=true&filter=gaussian"
+    _, job = call("post", "/v1/segmentations", expect=202, query=query, body=raw, headers=octets)
+    from_views = wait(walk, job)["segmentation"]
     call("get", "/v1/segmentations", expect=200)
     call("get", "/v1/segmentations/{id}", expect=200, id=segmentation)
     gated = beating()
@@ -524,13 +528,13 @@ def everything(walk, folder):
                 call("get", template, expect=200, headers=accept, id=made)
             for name in item["get"].get("x-files", {}):
                 # The files of the other wall than the one that `edge` asks for are named by it.
-                call(
-                    "get",
-                    template,
-                    expect=200,
-                    id=anatomical if "_apparent" in name else made,
-                    file=name.replace("NN", "01"),
-                )
+                if "_apparent" in name:
+                    own = anatomical
+                elif name == "projections.png":
+                    own = from_views
+                else:
+                    own = made
+                call("get", template, expect=200, id=own, file=name.replace("NN", "01"))
 
     webhooks(walk, order)
     received(walk)
@@ -743,7 +747,7 @@ def main():
     failures = [f"operationId {name} is not unique" for name in set(names) if names.count(name) > 1]
     folder = os.environ["SERVICE_DATA"] + "/phantom"
     subprocess.run(
-        [PROGRAM, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
+        [PROGRAM, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1", "--projections"],
         check=True,
         capture_output=True,
     )
