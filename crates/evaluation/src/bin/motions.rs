@@ -4,8 +4,7 @@
 //! rest and with each of [`MOTIONS`], with the same organs and other counts. TABLE has a row for each scan: the seed, the
 //! motion, its greatest difference between two views along the table and across it, mm, the root mean square of the
 //! error of the measured shifts in both directions, the measured ranges, whether it is told, the Jaccard index of the
-//! fitted wall with the true one, before the correction and after it, both confidences, and the processor time of the
-//! measurement, s.
+//! fitted wall with the true one, before the correction and after it, both confidences, and the time of the measurement, s.
 
 use anyhow::{Result, bail};
 use clap::Parser;
@@ -158,10 +157,10 @@ fn of_scan(
     let mut known: Vec<ViewShift> = (projections.views.iter().enumerate())
         .map(|(number, view)| {
             let [dx, dy] = moved.across(number, views);
-            let (sin, cos) = view.angle_deg.to_radians().sin_cos();
+            let [left, back] = view.columns();
             ViewShift {
                 along_mm: moved.at(number, views),
-                across_mm: dy * sin - dx * cos,
+                across_mm: dx * left + dy * back,
             }
         })
         .collect();
@@ -218,7 +217,7 @@ fn volume(projections: &Projections) -> Result<Volume> {
 /// The greatest Jaccard index of a mask with the true wall over moves by whole voxels: where the mean place of a patient
 /// who moved lies is nobody's fault.
 fn best_jaccard(mask: &Mask, truth: &Grid, spacing_mm: [f64; 3]) -> f64 {
-    let [nx, ny, nz] = mask.shape;
+    let [nx, ny, _] = mask.shape;
     let mut best: f64 = 0.0;
     for at in 0..5 * 5 * 7 {
         let off = [at % 5, at / 5 % 5, at / 25].map(|n| n as isize);
@@ -236,7 +235,6 @@ fn best_jaccard(mask: &Mask, truth: &Grid, spacing_mm: [f64; 3]) -> f64 {
         for (at, voxel) in known.voxels.iter_mut().enumerate() {
             *voxel = inside([at % nx, at / nx % ny, at / nx / ny]);
         }
-        debug_assert_eq!(known.voxels.len(), nx * ny * nz);
         let found = compare(mask, &known, spacing_mm, &Monitor::silent());
         best = best.max(found.map_or(0.0, |agreement| agreement.jaccard));
     }

@@ -477,29 +477,29 @@ pub struct Exposure {
 }
 
 /// Shifts a view by bins across the axis and along it, by linear interpolation.
-fn shift_view(grid: &mut Grid, view: usize, [along_u, along_z]: [f64; 2]) {
+fn shift_view(grid: &mut Grid, view: usize, [bins_across, bins_along]: [f64; 2]) {
     let [_, across, along] = grid.shape;
     let size = across * along;
     let own = &mut grid.values[view * size..(view + 1) * size];
-    let mut lines = vec![
-        (0..across)
-            .map(|u| (u * along, 1, along))
-            .collect::<Vec<_>>(),
-    ];
-    lines.push((0..along).map(|z| (z, along, across)).collect());
-    for (bins, lines) in [along_z, along_u].into_iter().zip(lines) {
-        if bins == 0.0 {
-            continue;
-        }
-        for (start, step, count) in lines {
-            let line: Vec<f32> = (0..count).map(|n| own[start + n * step]).collect();
-            for n in 0..count {
-                let from = (n as f64 - bins).clamp(0.0, (count - 1) as f64);
-                let low = (from as usize).min(count - 2);
-                let share = (from - low as f64) as f32;
-                own[start + n * step] = line[low] + share * (line[low + 1] - line[low]);
-            }
-        }
+    for u in 0..across {
+        shift_line(&mut own[u * along..], [1, along], bins_along);
+    }
+    for z in 0..along {
+        shift_line(&mut own[z..], [along, across], bins_across);
+    }
+}
+
+/// Shifts a line of so many values, `step` apart.
+fn shift_line(values: &mut [f32], [step, count]: [usize; 2], bins: f64) {
+    if bins == 0.0 {
+        return;
+    }
+    let line: Vec<f32> = (0..count).map(|n| values[n * step]).collect();
+    for n in 0..count {
+        let from = (n as f64 - bins).clamp(0.0, (count - 1) as f64);
+        let low = (from as usize).min(count - 2);
+        let share = (from - low as f64) as f32;
+        values[n * step] = line[low] + share * (line[low + 1] - line[low]);
     }
 }
 

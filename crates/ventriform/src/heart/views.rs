@@ -25,7 +25,7 @@ use crate::heart::deform::FittedModel;
 use crate::image::grid::blur::{Kernel, blur};
 use crate::image::grid::voxelise::voxelise;
 use crate::image::reconstruct::motion::{MeasuredShift, ViewShift, view_shifts, without_place};
-use crate::image::reconstruct::{Projections, View};
+use crate::image::reconstruct::{Projections, View, by_angle};
 use nalgebra::{DMatrix, DVector};
 
 /// Most steps and drifts of a scan.
@@ -40,16 +40,23 @@ const LEAST_STEP_MM: [f64; 2] = [4.5, 5.0];
 const LEAST_DRIFT_MM: f64 = 6.0;
 /// Views before and after a step at least.
 const LEAST_VIEWS: usize = 2;
-/// Deviation of the even error, mm, and the angle over which it stays, degrees, along the axis and across it.
-const ERROR_ALONG: [f64; 2] = [2.5, 25.0];
-const ERROR_ACROSS: [f64; 2] = [5.0, 30.0];
+/// What is to be expected along the axis.
+const ALONG: Expected = Expected {
+    error_mm: 2.5,
+    error_deg: 25.0,
+    move_mm: 20.0,
+};
+/// What is to be expected across it: a step that a few views hardly see is not made large.
+const ACROSS: Expected = Expected {
+    error_mm: 5.0,
+    error_deg: 30.0,
+    move_mm: 8.0,
+};
 /// The power of a view's lack of sharpness with which its errors grow: a half by counting noise alone; what the image
 /// does not know of weighs more.
 const VAGUE_POWER: f64 = 1.0;
 /// Least deviation of the noise of a view, mm.
 const LEAST_NOISE_MM: f64 = 0.4;
-/// Deviation of the moves to be expected, mm: a step across the axis that a few views hardly see is not made large.
-const EXPECTED_MM: [f64; 2] = [20.0, 8.0];
 /// Deviation of the place of the patient, mm: no limit.
 const PLACE_MM: f64 = 100.0;
 
@@ -125,51 +132,45 @@ impl HeartMotion {
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let directions = Directions::new(views);
-        let along = of(measured, |own| (own.shift.along_mm, own.sharpness[0]));
-        let across = of(measured, |own| (own.shift.across_mm, own.sharpness[1]));
-        let mut along = Line::new(views, &along, ERROR_ALONG, &[directions.even()]);
+        let each = measured.iter();
+        let along: Vec<(f64, f64)> = (each.clone())
+            .map(|own| (own.shift.along_mm, own.sharpness[0]))
+            .collect();
+        let across: Vec<(f64, f64)> = each
+            .map(|own| (own.shift.across_mm, own.sharpness[1]))
+            .collect();
+        let mut along = Line::new(views, &along, &ALONG, &[directions.even()]);
         let place = [directions.left.clone(), directions.back.clone()];
-        let mut across = Line::new(views, &across, ERROR_ACROSS, &place);
+        let mut across = Line::new(views, &across, &ACROSS, &place);
         let mut kept = Vec::new();
         for _ in 0..MOST_MOVES {
             monitor.check()?;
             let Some(best) = best_of(&directions, &along, &across, monitor)? else {
                 break;
             };
-            match best {
-                Kind::Across(view) => across.terms.extend(directions.across_from(view)),
-                Kind::Along(view) => along.terms.push(directions.from(view)),
-                Kind::Drift => along.terms.push(directions.drift()),
-            }
-            kept.push(best);
-        }
-        let (sizes_along, sizes_across) =
-            (along.sizes(EXPECTED_MM[0]), across.sizes(EXPECTED_MM[1]));
-        let (mut on_along, mut on_across) = (sizes_along.iter(), sizes_across.iter());
-        let mut size = |across: bool| {
-            let next = if across {
-                on_across.next()
-            } else {
-                on_along.next()
+            let at = match best {
+                Kind::Across(view) => across.take(directions.across_from(view)),
+                Kind::Along(view) => along.take([directions.from(view)]),
+                Kind::Drift => along.take([directions.drift()]),
             };
-            next.copied().unwrap_or(0.0)
-        };
-        let moves = kept.into_iter().map(|kind| match kind {
+            kept.push((best, at));
+        }
+        let moves = kept.into_iter().map(|(kind, at)| match kind {
             Kind::Along(view) => Move::Along {
                 view,
-                head_mm: size(false),
+                head_mm: along.sizes[at],
             },
             Kind::Drift => Move::Drift {
-                head_mm: size(false),
+                head_mm: along.sizes[at],
             },
             Kind::Across(view) => Move::Across {
                 view,
-                left_mm: size(true),
-                back_mm: size(true),
+                left_mm: across.sizes[at],
+                back_mm: across.sizes[at + 1],
             },
         });
         let moves: Vec<Move> = moves.collect();
-        let (along_mm, across_mm) = (along.sum(&sizes_along), across.sum(&sizes_across));
+        let (along_mm, across_mm) = (along.sum(), across.sum());
         let mut shifts: Vec<ViewShift> = (along_mm.iter().zip(across_mm.iter()))
             .map(|(along_mm, across_mm)| ViewShift {
                 along_mm: *along_mm,
@@ -226,7 +227,7 @@ fn best_of(
     let last = directions.times().saturating_sub(LEAST_VIEWS);
     for view in LEAST_VIEWS..=last {
         monitor.check()?;
-        let (gain, sizes) = along.gain(&[directions.from(view)], EXPECTED_MM[0]);
+        let (gain, sizes) = along.gain(&[directions.from(view)]);
         take(
             gain,
             LEAST_EVIDENCE[0],
@@ -234,7 +235,7 @@ fn best_of(
             LEAST_STEP_MM[0],
             Kind::Along(view),
         );
-        let (gain, sizes) = across.gain(&directions.across_from(view), EXPECTED_MM[1]);
+        let (gain, sizes) = across.gain(&directions.across_from(view));
         let size = sizes[0].hypot(sizes[1]);
         take(
             gain,
@@ -244,7 +245,7 @@ fn best_of(
             Kind::Across(view),
         );
     }
-    let (gain, sizes) = along.gain(&[directions.drift()], EXPECTED_MM[0]);
+    let (gain, sizes) = along.gain(&[directions.drift()]);
     take(
         gain,
         LEAST_EVIDENCE[2],
@@ -264,14 +265,14 @@ struct Directions {
 
 impl Directions {
     fn new(views: &[View]) -> Self {
-        let of = |part: fn(f64) -> f64| {
-            let parts = views.iter().map(|view| part(view.angle_deg.to_radians()));
+        let of = |axis: usize| {
+            let parts = views.iter().map(|view| view.columns()[axis]);
             DVector::from_iterator(views.len(), parts)
         };
         Self {
             times: views.iter().map(|view| view.time).collect(),
-            left: of(|angle| -angle.cos()),
-            back: of(f64::sin),
+            left: of(0),
+            back: of(1),
         }
     }
 
@@ -305,11 +306,27 @@ impl Directions {
     }
 }
 
+/// Errors and moves of one direction.
+struct Expected {
+    /// Deviation of the even error, mm.
+    error_mm: f64,
+    /// The angle over which it stays, degrees.
+    error_deg: f64,
+    /// Deviation of the moves, mm.
+    move_mm: f64,
+}
+
 /// What was measured in one direction, the inverse of its covariance, and the moves that are taken for true.
 struct Line {
     values: DVector<f64>,
     inverse: DMatrix<f64>,
+    /// Deviation of the moves, mm.
+    move_mm: f64,
     terms: Vec<DVector<f64>>,
+    /// The weighted squares that `terms` explain.
+    explained: f64,
+    /// The sizes of `terms`, mm.
+    sizes: Vec<f64>,
 }
 
 impl Line {
@@ -317,7 +334,7 @@ impl Line {
     fn new(
         views: &[View],
         measured: &[(f64, f64)],
-        [deviation_mm, angle_deg]: [f64; 2],
+        expected: &Expected,
         free: &[DVector<f64>],
     ) -> Self {
         let count = measured.len();
@@ -326,8 +343,8 @@ impl Line {
         let vague = vagueness(measured);
         let mut covariance = DMatrix::from_fn(count, count, |i, j| {
             let apart = (views[i].angle_deg - views[j].angle_deg).rem_euclid(360.0);
-            let root = 5_f64.sqrt() * apart.min(360.0 - apart) / angle_deg;
-            let even = deviation_mm.powi(2) * (1.0 + root + root * root / 3.0) * (-root).exp();
+            let root = 5_f64.sqrt() * apart.min(360.0 - apart) / expected.error_deg;
+            let even = expected.error_mm.powi(2) * (1.0 + root + root * root / 3.0) * (-root).exp();
             vague[i] * vague[j] * (even + if i == j { noise * noise } else { 0.0 })
         });
         for direction in free {
@@ -337,32 +354,37 @@ impl Line {
         Self {
             inverse: inverse.unwrap_or_else(|| DMatrix::identity(count, count)),
             values,
+            move_mm: expected.move_mm,
             terms: Vec::new(),
+            explained: 0.0,
+            sizes: Vec::new(),
         }
+    }
+
+    /// Takes moves for true, and gives the place of the first among the terms.
+    fn take(&mut self, more: impl IntoIterator<Item = DVector<f64>>) -> usize {
+        let first = self.terms.len();
+        self.terms.extend(more);
+        (self.explained, self.sizes) = self.explained_with(&[]);
+        first
     }
 
     /// By how much the weighted squares get less with these moves beside those that are taken for true, and the sizes
     /// of these.
-    fn gain(&self, more: &[DVector<f64>], expected_mm: f64) -> (f64, Vec<f64>) {
-        let all: Vec<&DVector<f64>> = self.terms.iter().chain(more).collect();
-        let (explained, sizes) = self.explained(&all, expected_mm);
-        let (before, _) = self.explained(&self.terms.iter().collect::<Vec<_>>(), expected_mm);
-        (explained - before, sizes[self.terms.len()..].to_vec())
+    fn gain(&self, more: &[DVector<f64>]) -> (f64, Vec<f64>) {
+        let (explained, mut sizes) = self.explained_with(more);
+        (
+            explained - self.explained,
+            sizes.split_off(self.terms.len()),
+        )
     }
 
-    fn sizes(&self, expected_mm: f64) -> Vec<f64> {
-        self.explained(&self.terms.iter().collect::<Vec<_>>(), expected_mm)
-            .1
-    }
-
-    /// The weighted squares that moves explain, and their sizes.
-    fn explained(&self, terms: &[&DVector<f64>], expected_mm: f64) -> (f64, Vec<f64>) {
-        if terms.is_empty() {
-            return (0.0, Vec::new());
-        }
+    /// The weighted squares that the moves and `more` explain, and the sizes of all of them.
+    fn explained_with(&self, more: &[DVector<f64>]) -> (f64, Vec<f64>) {
+        let terms: Vec<&DVector<f64>> = self.terms.iter().chain(more).collect();
         let weighted: Vec<DVector<f64>> = terms.iter().map(|term| &self.inverse * *term).collect();
         let squares = DMatrix::from_fn(terms.len(), terms.len(), |i, j| {
-            let prior = if i == j { expected_mm.powi(-2) } else { 0.0 };
+            let prior = if i == j { self.move_mm.powi(-2) } else { 0.0 };
             weighted[i].dot(terms[j]) + prior
         });
         let products =
@@ -376,19 +398,12 @@ impl Line {
         }
     }
 
-    fn sum(&self, sizes: &[f64]) -> DVector<f64> {
-        let parts = self
-            .terms
-            .iter()
-            .zip(sizes)
-            .map(|(term, size)| term * *size);
+    /// What the moves that are taken for true add up to in each view, mm.
+    fn sum(&self) -> DVector<f64> {
+        let parts = self.terms.iter().zip(&self.sizes);
+        let parts = parts.map(|(term, size)| term * *size);
         parts.fold(DVector::zeros(self.values.len()), |sum, part| sum + part)
     }
-}
-
-/// Values with the sharpness of each.
-fn of(measured: &[MeasuredShift], own: fn(&MeasuredShift) -> (f64, f64)) -> Vec<(f64, f64)> {
-    measured.iter().map(own).collect()
 }
 
 /// By what factor the errors of each view are greater than those of most: views in which the heart hardly shows tell
@@ -411,11 +426,10 @@ fn noise_mm(views: &[View], values: &DVector<f64>) -> f64 {
     /// Deviation over median size of a normal distribution, and over a second difference's.
     const PER_MEDIAN: f64 = 1.4826;
     const PER_DIFFERENCE: f64 = 2.449_489_742_783_178;
-    let mut order: Vec<usize> = (0..views.len()).collect();
-    order.sort_by(|a, b| views[*a].angle_deg.total_cmp(&views[*b].angle_deg));
-    if order.len() < 3 {
+    if views.len() < 3 {
         return LEAST_NOISE_MM;
     }
+    let order = by_angle(views);
     let second = order
         .windows(3)
         .map(|v| (values[v[0]] - 2.0 * values[v[1]] + values[v[2]]).abs());

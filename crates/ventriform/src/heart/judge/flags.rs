@@ -68,8 +68,8 @@ pub enum Flag {
     },
     /// A view has other counts than those beside it.
     #[error(
-        "view {view} of the projections has {percent:+.0} % more counts than the views beside it: it may have been cut \
-         short, repeated or added up wrongly"
+        "the counts of view {view} of the projections differ by {percent:+.0} % from those of the views beside it: it may \
+         have been cut short, repeated or added up wrongly"
     )]
     OddView {
         /// Its number, from 1, in the order in which the camera turned.

@@ -22,10 +22,10 @@ struct Turn {
 
 impl Turn {
     fn new(view: View) -> Self {
-        let (sin, cos) = view.angle_deg.to_radians().sin_cos();
+        let columns = view.columns();
         Self {
-            detector: [sin, cos],
-            columns: [-cos, sin],
+            detector: [columns[1], -columns[0]],
+            columns,
         }
     }
 }

@@ -35,7 +35,7 @@ pub use parameters::{
     AXIS_OFFSET_MM, CUT_OFF_PER_CM, FILTER_ORDER, FWHM_MM, Filter, ITERATIONS, Method,
     Reconstruction, SUBSETS,
 };
-pub use projections::{ODD_VIEW_PERCENT, OddView, Projections, ProjectionsError, View};
+pub use projections::{ODD_VIEW_PERCENT, OddView, Projections, ProjectionsError, View, by_angle};
 
 use self::camera::Camera;
 use crate::base::progress::{Cancelled, Monitor};

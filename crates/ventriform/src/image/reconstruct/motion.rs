@@ -395,16 +395,12 @@ fn widened(seen: &[bool], columns: usize, rows: usize) -> Vec<bool> {
     near
 }
 
-/// Takes out of the shifts what is another place of the patient: the median along the axis; across it, the part that
-/// goes with the columns' directions.
+/// Takes out of the shifts what is another place of the patient: the mean along the axis; across it, the part that goes
+/// with the columns' directions.
 pub fn without_place(views: &[View], shifts: &mut [ViewShift]) {
     let count = shifts.len().max(1) as f64;
     let mean = shifts.iter().map(|shift| shift.along_mm).sum::<f64>() / count;
-    let direction = |view: &View| {
-        let (sin, cos) = view.angle_deg.to_radians().sin_cos();
-        Vector2::new(-cos, sin)
-    };
-    let terms = views.iter().map(direction);
+    let terms = views.iter().map(|view| Vector2::from(view.columns()));
     let squares: Matrix2<f64> = terms.clone().map(|d| d * d.transpose()).sum();
     let products: Vector2<f64> = terms
         .clone()

@@ -48,6 +48,21 @@ pub struct View {
     pub time: usize,
 }
 
+impl View {
+    /// The direction of the detector's columns in x and y, which is -cos and sin of its angle.
+    pub fn columns(&self) -> [f64; 2] {
+        let (sin, cos) = self.angle_deg.to_radians().sin_cos();
+        [-cos, sin]
+    }
+}
+
+/// The numbers of `views` in the order of their angles.
+pub fn by_angle(views: &[View]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..views.len()).collect();
+    order.sort_by(|a, b| views[*a].angle_deg.total_cmp(&views[*b].angle_deg));
+    order
+}
+
 /// The projections of one gate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projections {
@@ -160,12 +175,7 @@ impl Projections {
     /// The view whose counts lie farthest from the mean of the views beside it, if that is more than
     /// [`ODD_VIEW_PERCENT`]. Those at the ends of the arc have no two views beside them.
     pub fn odd_view(&self) -> Option<OddView> {
-        let mut order: Vec<usize> = (0..self.views.len()).collect();
-        order.sort_by(|a, b| {
-            self.views[*a]
-                .angle_deg
-                .total_cmp(&self.views[*b].angle_deg)
-        });
+        let order = by_angle(&self.views);
         let off = order.windows(3).map(|three| {
             let [before, own, after] = [0, 1, 2].map(|n| self.counts_of(three[n]));
             let usual = 0.5 * (before + after);

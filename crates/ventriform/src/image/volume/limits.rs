@@ -41,6 +41,15 @@ pub struct FromProjections {
     pub shifts: Vec<ViewShift>,
 }
 
+impl From<Reconstruction> for FromProjections {
+    fn from(reconstruction: Reconstruction) -> Self {
+        Self {
+            reconstruction,
+            shifts: Vec::new(),
+        }
+    }
+}
+
 /// Upper bounds on what reading a file may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReadLimits {

@@ -3,7 +3,7 @@
 
 use super::gates::GatedReading;
 use super::left_out::LeftOut;
-use super::limits::{FromProjections, ReadLimits, ReadOptions};
+use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, Reading};
 use super::read::{Told, open_as};
 use super::source::VolumeFile;
@@ -36,18 +36,11 @@ pub fn projections(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Option<Projections>, VolumeError> {
-    let opened = open_as(files, &told(how), limits, monitor)?;
+    let opened = open_as(files, &Told::of(&(*how).into()), limits, monitor)?;
     let all: Vec<usize> = (0..opened.file.header().frames).collect();
     let frames = frame.map_or(all, |frame| vec![frame]);
     let counts = opened.file.projections(&frames, monitor).transpose();
     counts.map_err(|error| error.with_path(files))
-}
-
-fn told(how: &Reconstruction) -> Told {
-    Told::of(&FromProjections {
-        reconstruction: *how,
-        ..FromProjections::default()
-    })
 }
 
 /// Reconstructs the projections in `files` as `how` says: every gate, or one volume of the counts of all gates if
@@ -62,7 +55,7 @@ pub fn reconstructed(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reconstructed, VolumeError> {
-    let mut opened = open_as(files, &told(how), limits, monitor)?;
+    let mut opened = open_as(files, &Told::of(&(*how).into()), limits, monitor)?;
     let header = opened.file.header();
     if header.format != FileFormat::DicomProjections {
         return Err(VolumeError::NotSlices {

@@ -3,6 +3,7 @@
 use super::json_number::round;
 use crate::heart::views::{HeartMotion, Move};
 use crate::image::reconstruct::Projections;
+use crate::image::reconstruct::motion::ViewShift;
 use serde::{Deserialize, Serialize};
 
 /// The projections that slices were reconstructed of, and the heart's motion in them.
@@ -86,9 +87,7 @@ impl ProjectionsReport {
     ) -> Self {
         let views = projections.views.iter().enumerate().map(|(number, view)| {
             let shift =
-                |of: fn(&HeartMotion) -> &[crate::image::reconstruct::motion::ViewShift]| {
-                    motion.map(|motion| of(motion)[number])
-                };
+                |of: fn(&HeartMotion) -> &[ViewShift]| motion.map(|motion| of(motion)[number]);
             let (measured, moved) = (shift(|m| &m.measured), shift(|m| &m.shifts));
             ViewReport {
                 angle_deg: round(view.angle_deg.rem_euclid(360.0)),

@@ -5,9 +5,12 @@ use super::order::GatedOrder;
 use crate::base::progress::Monitor;
 use crate::heart::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::heart::deform::WallSurface;
+use crate::heart::judge::Flag;
 use crate::heart::normals::{HeartFigure, Perfusion};
 use crate::heart::polar::SEGMENT_NAMES;
-use crate::image::volume::{FromProjections, GatedReading, ReadLimits, Volume, read_gates_with};
+use crate::image::volume::{
+    FileFormat, FromProjections, GatedReading, ReadLimits, Volume, read_gates_with,
+};
 use crate::mesh::TriMesh;
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::results::report::{
@@ -15,8 +18,8 @@ use crate::results::report::{
     SegmentationReport,
 };
 use crate::runs::segmentation::{
-    Acquired, Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare,
-    segment, uncorrected,
+    MadeOfSlices, Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare,
+    segment, with_motion,
 };
 
 /// The beat of a study with what it was made from.
@@ -62,30 +65,8 @@ pub fn from_files(
         });
     }
     let parameters = order.parameters.clone();
-    let from = FromProjections {
-        reconstruction: parameters.reconstruction,
-        ..FromProjections::default()
-    };
-    let mut fitted = fitted_sum(order, &from, limits, monitor)?;
-    let acquired = Acquired::of_files(
-        order.gates,
-        fitted.reading.facts.format,
-        &parameters,
-        (&fitted.segmentation.fit.model, &fitted.study.sum),
-        limits,
-        monitor,
-    )?;
-    if let Some(mut acquired) = acquired {
-        let shifted = acquired.corrected(&parameters);
-        if let Some(shifted) = shifted.filter(|_| parameters.correct_motion) {
-            let after = fitted_sum(order, &shifted, limits, monitor)?;
-            let before = std::mem::replace(&mut fitted, after);
-            let change = uncorrected(&before.segmentation, &fitted.segmentation);
-            acquired.uncorrected = Some(change);
-        }
-        let flags = &mut fitted.segmentation.fit.judgement.flags;
-        *flags = acquired.judged(std::mem::take(flags));
-    }
+    let make = |from: &FromProjections| fitted_sum(order, from, limits, monitor);
+    let (fitted, _) = with_motion(order.gates, &parameters, limits, monitor, make)?;
     let FittedSum {
         mut reading,
         study,
@@ -138,6 +119,17 @@ struct FittedSum {
     reading: GatedReading,
     study: GatedStudy,
     segmentation: Segmentation,
+}
+
+impl MadeOfSlices for FittedSum {
+    fn parts(&self) -> (FileFormat, &Volume, &Segmentation) {
+        let format = self.reading.facts.format;
+        (format, &self.study.sum, &self.segmentation)
+    }
+
+    fn flags(&mut self) -> &mut Vec<Flag> {
+        &mut self.segmentation.fit.judgement.flags
+    }
 }
 
 /// The segmentation of the sum of gates that are made as `from` says.

@@ -1,8 +1,11 @@
 //! What a camera acquired, where slices were reconstructed here: the projections, and the heart's motion in them.
 
+use super::segment::Segmentation;
+use crate::base::numeric::decimals::round;
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::deform::FittedModel;
 use crate::heart::judge::Flag;
+use crate::heart::polar::PolarSummary;
 use crate::heart::views::HeartMotion;
 use crate::image::draw::Image;
 use crate::image::reconstruct::Projections;
@@ -30,46 +33,57 @@ pub struct Acquired {
     pub uncorrected: Option<UncorrectedReport>,
 }
 
+/// What is made of slices.
+pub(crate) trait MadeOfSlices {
+    /// The format of the files, the volume that the model was fitted to, and its segmentation.
+    fn parts(&self) -> (FileFormat, &Volume, &Segmentation);
+    /// The flags of the fit.
+    fn flags(&mut self) -> &mut Vec<Flag>;
+}
+
+/// What `make` makes of the slices in `files`, with what a camera acquired if they are projections: the heart's motion is
+/// measured, its views are shifted back and all is made again if the parameters ask for it, and the flags of the fit
+/// say so.
+///
+/// # Errors
+/// Those of `make`, and [`VolumeError`].
+pub(crate) fn with_motion<M: MadeOfSlices, E: From<VolumeError>>(
+    files: &[VolumeFile],
+    parameters: &FitParameters,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+    make: impl Fn(&FromProjections) -> Result<M, E>,
+) -> Result<(M, Option<Acquired>), E> {
+    let mut from = FromProjections::from(parameters.reconstruction);
+    let mut made = make(&from)?;
+    let (format, volume, segmentation) = made.parts();
+    if format != FileFormat::DicomProjections {
+        return Ok((made, None));
+    }
+    let how = &parameters.reconstruction;
+    let Some(projections) = volume::projections(files, parameters.frame, how, limits, monitor)?
+    else {
+        return Ok((made, None));
+    };
+    let (model, offset_mm) = (&segmentation.fit.model, how.axis_offset_mm);
+    let motion = HeartMotion::measured(&projections, offset_mm, model, &volume.frame, monitor);
+    let mut acquired = Acquired {
+        motion: motion.map_err(VolumeError::from)?,
+        projections,
+        uncorrected: None,
+    };
+    let moved = (acquired.motion.as_ref()).filter(|motion| motion.moved());
+    if let Some(motion) = moved.filter(|_| parameters.correct_motion) {
+        from.shifts.clone_from(&motion.shifts);
+        let before = std::mem::replace(&mut made, make(&from)?);
+        acquired.uncorrected = Some(uncorrected(before.parts().2, made.parts().2));
+    }
+    let flags = made.flags();
+    *flags = acquired.judged(std::mem::take(flags));
+    Ok((made, Some(acquired)))
+}
+
 impl Acquired {
-    /// What was acquired for the volume in `files` of this format that the model was fitted to; `None` unless the files
-    /// hold projections.
-    ///
-    /// # Errors
-    /// [`VolumeError`].
-    pub fn of_files(
-        files: &[VolumeFile],
-        format: FileFormat,
-        parameters: &FitParameters,
-        (model, volume): (&FittedModel, &Volume),
-        limits: &ReadLimits,
-        monitor: &Monitor<'_>,
-    ) -> Result<Option<Self>, VolumeError> {
-        if format != FileFormat::DicomProjections {
-            return Ok(None);
-        }
-        let how = &parameters.reconstruction;
-        let Some(projections) = volume::projections(files, parameters.frame, how, limits, monitor)?
-        else {
-            return Ok(None);
-        };
-        let offset_mm = how.axis_offset_mm;
-        let motion = HeartMotion::measured(&projections, offset_mm, model, &volume.frame, monitor)?;
-        Ok(Some(Self {
-            projections,
-            motion,
-            uncorrected: None,
-        }))
-    }
-
-    /// How volumes are made with the views shifted back; `None` if the heart did not move.
-    pub fn corrected(&self, parameters: &FitParameters) -> Option<FromProjections> {
-        let motion = self.motion.as_ref().filter(|motion| motion.moved())?;
-        Some(FromProjections {
-            reconstruction: parameters.reconstruction,
-            shifts: motion.shifts.clone(),
-        })
-    }
-
     /// `flags` of a fit with what the projections tell: motion is measured, not guessed by the image.
     pub fn judged(&self, mut flags: Vec<Flag>) -> Vec<Flag> {
         if let Some(motion) = &self.motion {
@@ -160,6 +174,30 @@ impl Acquired {
         let z_mm = model.cup.as_ref().map_or(0.0, |cup| cup.centre.z);
         let middle = 0.5 * (self.projections.rows as f64 - 1.0);
         (middle - z_mm / self.projections.pixel_mm).clamp(0.0, 2.0 * middle) as usize
+    }
+}
+
+/// What a fit gave before views were shifted back, beside what it gave after that.
+fn uncorrected(before: &Segmentation, after: &Segmentation) -> UncorrectedReport {
+    let segments = |made: &Segmentation| -> Vec<Option<f64>> {
+        let map = made.polar.as_ref().map(PolarSummary::from_map);
+        map.map_or_else(Vec::new, |map| {
+            let means = map.segments.iter().map(|segment| segment.mean_percent);
+            means.collect()
+        })
+    };
+    let (own, other) = (segments(before), segments(after));
+    let change = own.iter().zip(&other).map(|(before, after)| {
+        let change = after.zip(*before).map(|(after, before)| after - before);
+        change.map(round)
+    });
+    let model = &before.fit.model;
+    UncorrectedReport {
+        confidence: round(before.fit.judgement.confidence),
+        wall_ml: round(model.wall_ml),
+        cavity_ml: model.wall.as_ref().map(|wall| round(wall.cavity_ml)),
+        segments_change: change.collect(),
+        segments_percent: own,
     }
 }
 

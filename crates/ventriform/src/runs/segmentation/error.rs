@@ -97,6 +97,15 @@ impl SegmentationError {
     }
 }
 
+impl From<VolumeError> for SegmentationError {
+    fn from(error: VolumeError) -> Self {
+        match error {
+            VolumeError::Cancelled(cancelled) => cancelled.into(),
+            error => SegmentationError::Volume(error),
+        }
+    }
+}
+
 impl From<GivenMaskError> for SegmentationError {
     fn from(error: GivenMaskError) -> Self {
         match error {

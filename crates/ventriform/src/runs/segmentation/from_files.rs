@@ -1,22 +1,21 @@
 //! A segmentation from files: read, segment, keep what the output needs.
 
-use super::acquired::Acquired;
+use super::acquired::{Acquired, MadeOfSlices, with_motion};
 use super::error::SegmentationError;
 use super::normals::{heart_figures, judged_by_normals};
 use super::order::{NamedReader, SegmentationOrder};
 use super::segment::{Segmentation, SegmentationParameters, segment};
 use super::templates::prepare;
-use crate::base::numeric::decimals::round;
 use crate::base::progress::Monitor;
+use crate::heart::judge::Flag;
 use crate::heart::model::Organ;
 use crate::heart::normals::Perfusion;
-use crate::heart::polar::PolarSummary;
 use crate::image::volume::given_mask::{GivenMask, PlacedMask, read_mask};
 use crate::image::volume::{
-    self, FromProjections, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile,
+    self, FileFormat, FromProjections, ReadLimits, ReadOptions, Reading, Volume, VolumeError,
+    VolumeFile,
 };
 use crate::parameters::FitParameters;
-use crate::results::report::UncorrectedReport;
 
 /// A volume's segmentation with what it was made from.
 #[derive(Debug, Clone)]
@@ -88,39 +87,21 @@ pub fn from_files(
     monitor: &Monitor<'_>,
 ) -> Result<SegmentedVolume, SegmentationError> {
     check_reader(order)?;
-    let from = FromProjections {
-        reconstruction: order.parameters.reconstruction,
-        ..FromProjections::default()
-    };
-    let mut made = made(order, &from, limits, monitor)?;
-    made.acquired = Acquired::of_files(
-        order.volume,
-        made.reading.facts.format,
-        order.parameters,
-        (&made.segmentation.fit.model, &made.reading.volume),
-        limits,
-        monitor,
-    )
-    .map_err(|error| unusable(error, SegmentationError::Volume))?;
-    let Some(acquired) = made.acquired.take() else {
-        return Ok(made);
-    };
-    let shifted = acquired.corrected(order.parameters);
-    let acquired = match shifted.filter(|_| order.parameters.correct_motion) {
-        None => acquired,
-        Some(shifted) => {
-            let before =
-                std::mem::replace(&mut made, self::made(order, &shifted, limits, monitor)?);
-            Acquired {
-                uncorrected: Some(uncorrected(&before.segmentation, &made.segmentation)),
-                ..acquired
-            }
-        }
-    };
-    let flags = &mut made.segmentation.fit.judgement.flags;
-    *flags = acquired.judged(std::mem::take(flags));
-    made.acquired = Some(acquired);
+    let make = |from: &FromProjections| made(order, from, limits, monitor);
+    let (mut made, acquired) = with_motion(order.volume, order.parameters, limits, monitor, make)?;
+    made.acquired = acquired;
     Ok(made)
+}
+
+impl MadeOfSlices for SegmentedVolume {
+    fn parts(&self) -> (FileFormat, &Volume, &Segmentation) {
+        let Reading { facts, volume, .. } = &self.reading;
+        (facts.format, volume, &self.segmentation)
+    }
+
+    fn flags(&mut self) -> &mut Vec<Flag> {
+        &mut self.segmentation.fit.judgement.flags
+    }
 }
 
 /// The segmentation of slices that are made as `from` says.
@@ -132,8 +113,7 @@ fn made(
 ) -> Result<SegmentedVolume, SegmentationError> {
     let frame = order.parameters.frame;
     let parts = 1 + usize::from(order.expert.is_some());
-    let reading = read(order.volume, frame, from, limits, &monitor.part(0, parts))
-        .map_err(|error| unusable(error, SegmentationError::Volume))?;
+    let reading = read(order.volume, frame, from, limits, &monitor.part(0, parts))?;
     let parameters = order.parameters.clone();
     let choice = &parameters.mask;
     let expert = order
@@ -178,30 +158,6 @@ fn made(
     })
 }
 
-/// What a fit gave before views were shifted back, beside what it gave after that.
-pub(crate) fn uncorrected(before: &Segmentation, after: &Segmentation) -> UncorrectedReport {
-    let segments = |made: &Segmentation| -> Vec<Option<f64>> {
-        let map = made.polar.as_ref().map(PolarSummary::from_map);
-        map.map_or_else(Vec::new, |map| {
-            let means = map.segments.iter().map(|segment| segment.mean_percent);
-            means.collect()
-        })
-    };
-    let (own, other) = (segments(before), segments(after));
-    let change = own.iter().zip(&other).map(|(before, after)| {
-        let change = after.zip(*before).map(|(after, before)| after - before);
-        change.map(round)
-    });
-    let model = &before.fit.model;
-    UncorrectedReport {
-        confidence: round(before.fit.judgement.confidence),
-        wall_ml: round(model.wall_ml),
-        cavity_ml: model.wall.as_ref().map(|wall| round(wall.cavity_ml)),
-        segments_change: change.collect(),
-        segments_percent: own,
-    }
-}
-
 /// Refuses a reader's profile that says nothing of the wall asked for.
 fn check_reader(order: &SegmentationOrder<'_>) -> Result<(), SegmentationError> {
     let Some(NamedReader { name, profile }) = &order.reader else {
@@ -231,14 +187,4 @@ fn read(
     monitor: &Monitor<'_>,
 ) -> Result<Reading, VolumeError> {
     volume::read_with(files, &ReadOptions { frame }, from, limits, monitor)?.usable()
-}
-
-fn unusable(
-    error: VolumeError,
-    which: impl FnOnce(VolumeError) -> SegmentationError,
-) -> SegmentationError {
-    match error {
-        VolumeError::Cancelled(cancelled) => cancelled.into(),
-        error => which(error),
-    }
 }

@@ -47,6 +47,7 @@ mod region;
 mod error;
 
 pub use acquired::Acquired;
+pub(crate) use acquired::{MadeOfSlices, with_motion};
 pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
@@ -55,7 +56,6 @@ pub(crate) use files::{
     uptake_files,
 };
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
-pub(crate) use from_files::uncorrected;
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use normals::{heart_figures, judged_by_normals};

@@ -26,7 +26,7 @@ mod views;
 pub use anatomy::HeartPose;
 pub use healthy::{HealthyPerson, healthy_person};
 pub use parameters::{PerfusionDefect, PhantomError, PhantomParameters, UptakeVariation};
-pub use views::{VIEW_COUNT, phantom_projections};
+pub use views::phantom_projections;
 
 use self::anatomy::Anatomy;
 use super::Volume;
@@ -56,12 +56,8 @@ pub struct Phantom {
 /// [`PhantomError`] if a parameter is out of range, the heart does not fit into the volume, or the
 /// work was cancelled.
 pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phantom, PhantomError> {
-    parameters.check()?;
     let p = parameters;
-    let anatomy = Anatomy::new(p);
-    let frame = VoxelToPatient::centred(p.shape, p.spacing_mm, anatomy::FIELD_CENTRE)
-        .expect("the spacing was checked to be positive");
-    anatomy.check_fits(p)?;
+    let (anatomy, frame) = placed(p)?;
     let step = |fraction| monitor.report(Stage::Read, fraction);
     step(0.0)?;
     let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
@@ -70,13 +66,7 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     }
     step(0.3)?;
     let filter = kernels(p.post_filter_mm, p.spacing_mm);
-    let system = (p.fwhm_mm.powi(2) - p.post_filter_mm.powi(2)).sqrt();
-    blur(
-        &mut voxels,
-        p.shape,
-        &kernels(system, p.spacing_mm),
-        monitor,
-    )?;
+    blur(&mut voxels, p.shape, &system_kernels(p), monitor)?;
     step(0.6)?;
     if p.noise > 0.0 {
         let gain: f64 = filter.iter().map(Kernel::noise_gain).product();
@@ -105,6 +95,22 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
         pose: anatomy.pose(),
         parameters: p.clone(),
     })
+}
+
+/// The patient of checked parameters, and the grid about them.
+fn placed(p: &PhantomParameters) -> Result<(Anatomy<'_>, VoxelToPatient), PhantomError> {
+    p.check()?;
+    let anatomy = Anatomy::new(p);
+    let frame = VoxelToPatient::centred(p.shape, p.spacing_mm, anatomy::FIELD_CENTRE)
+        .expect("the spacing was checked to be positive");
+    anatomy.check_fits(p)?;
+    Ok((anatomy, frame))
+}
+
+/// The kernels of the resolution of camera and collimator.
+fn system_kernels(p: &PhantomParameters) -> [Kernel; 3] {
+    let system_mm = (p.fwhm_mm.powi(2) - p.post_filter_mm.powi(2)).sqrt();
+    kernels(system_mm, p.spacing_mm)
 }
 
 /// The kernels along i, j, k of a Gaussian with the full width at half maximum `fwhm_mm`, cut off at

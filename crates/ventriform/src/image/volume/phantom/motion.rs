@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Views over half a turn.
-const VIEW_COUNT: usize = 60;
+pub(super) const VIEW_COUNT: usize = 60;
 /// Angle of the first view's rows (towards the patient's left and right), from i to j.
 const FIRST_VIEW_RAD: f64 = 0.75 * PI;
 
@@ -28,8 +28,7 @@ const FIRST_VIEW_RAD: f64 = 0.75 * PI;
 pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
     let (shape, spacing_mm) = (p.shape, p.spacing_mm);
     let after = displaced(voxels, shape, p.motion_mm / spacing_mm[2]);
-    let of_a_head = VIEW_COUNT / usize::from(p.heads);
-    let first_after = ((1.0 - p.motion_share) * of_a_head as f64).round() as usize;
+    let (of_a_head, first_after) = views_of_a_head(p);
     let few_after = first_after > of_a_head / 2;
     let (mut image, other) = if few_after {
         (voxels.to_vec(), after.as_slice())
@@ -55,6 +54,15 @@ pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
         }
     });
     image
+}
+
+/// The number of views of a head, and that of the first one after the motion.
+pub(super) fn views_of_a_head(p: &PhantomParameters) -> (usize, usize) {
+    let count = VIEW_COUNT / usize::from(p.heads);
+    (
+        count,
+        ((1.0 - p.motion_share) * count as f64).round() as usize,
+    )
 }
 
 /// The voxels moved along k, linearly interpolated.

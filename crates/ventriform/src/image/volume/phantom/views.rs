@@ -7,17 +7,14 @@
 //!
 //! Not modelled: attenuation, scatter, resolution by distance.
 
-use super::anatomy::{self, Anatomy};
+use super::motion::{self, VIEW_COUNT};
 use super::parameters::{PhantomError, PhantomParameters};
-use super::{kernels, motion, poisson};
-use crate::base::geometry::frame::VoxelToPatient;
+use super::{placed, poisson, system_kernels};
 use crate::base::geometry::random::{Purpose, stream};
 use crate::base::progress::Monitor;
 use crate::image::grid::blur::blur;
 use crate::image::reconstruct::{Projections, View, project};
 
-/// Views over half a turn.
-pub const VIEW_COUNT: usize = 60;
 /// The detector's angle at the first view, degrees: the right in front.
 const FIRST_VIEW_DEG: f64 = 225.0;
 
@@ -30,39 +27,26 @@ pub fn phantom_projections(
     counts_m: f64,
     monitor: &Monitor,
 ) -> Result<Projections, PhantomError> {
-    parameters.check()?;
     let p = parameters;
+    let (anatomy, frame) = placed(p)?;
     let [columns, deep, rows] = p.shape;
     let pixel_mm = p.spacing_mm[0];
     if deep != columns || p.spacing_mm != [pixel_mm; 3] {
         return Err(PhantomError::NoCubes);
     }
-    let frame = VoxelToPatient::centred(p.shape, p.spacing_mm, anatomy::FIELD_CENTRE)
-        .expect("the spacing was checked to be positive");
-    let anatomy = Anatomy::new(p);
-    anatomy.check_fits(p)?;
     let (mut uptake, _) = anatomy.render(p.shape, &frame, monitor)?;
-    let system_mm = (p.fwhm_mm.powi(2) - p.post_filter_mm.powi(2)).sqrt();
-    blur(
-        &mut uptake,
-        p.shape,
-        &kernels(system_mm, p.spacing_mm),
-        monitor,
-    )?;
-    let views = views(usize::from(p.heads));
-    let mut projections = project(&uptake, [columns, rows], pixel_mm, views.clone());
+    blur(&mut uptake, p.shape, &system_kernels(p), monitor)?;
+    let (of_a_head, first_after) = motion::views_of_a_head(p);
+    let seen = |image: &[f32]| project(image, [columns, rows], pixel_mm, views(of_a_head));
+    let mut projections = seen(&uptake);
     if p.motion_mm != 0.0 {
-        let moved = motion::displaced(&uptake, p.shape, p.motion_mm / pixel_mm);
-        let after = project(&moved, [columns, rows], pixel_mm, views.clone()).counts;
-        let first = ((1.0 - p.motion_share) * (VIEW_COUNT / usize::from(p.heads)) as f64).round();
+        let moved = seen(&motion::displaced(&uptake, p.shape, p.motion_mm / pixel_mm)).counts;
         let pixels = columns * rows;
-        for (number, _) in views
-            .iter()
-            .enumerate()
-            .filter(|(_, view)| view.time as f64 >= first)
-        {
+        let after =
+            (projections.views.iter().enumerate()).filter(|(_, view)| view.time >= first_after);
+        for (number, _) in after {
             let own = number * pixels..(number + 1) * pixels;
-            projections.counts[own.clone()].copy_from_slice(&after[own]);
+            projections.counts[own.clone()].copy_from_slice(&moved[own]);
         }
     }
     monitor.check()?;
@@ -75,12 +59,11 @@ pub fn phantom_projections(
     Ok(projections)
 }
 
-/// The views of one or two heads, in the order of their angles.
-fn views(heads: usize) -> Vec<View> {
-    let each = VIEW_COUNT / heads;
+/// The views of heads with so many each, in the order of their angles.
+fn views(of_a_head: usize) -> Vec<View> {
     let view = |number: usize| View {
         angle_deg: FIRST_VIEW_DEG - 180.0 * number as f64 / VIEW_COUNT as f64,
-        time: number % each,
+        time: number % of_a_head,
     };
     (0..VIEW_COUNT).map(view).collect()
 }

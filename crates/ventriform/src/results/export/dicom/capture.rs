@@ -54,13 +54,7 @@ pub(super) fn put(
     let burned_in = if is_identified { "YES" } else { "NO" };
     set.text(tags::BURNED_IN_ANNOTATION, burned_in);
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
-    if let Some(images) = scan.images() {
-        let mut sources = images.processed();
-        for source in &mut sources {
-            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "NO");
-        }
-        set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
-    }
+    scan.put_sources(set);
     let format = PixelFormat {
         rows,
         columns,

@@ -30,7 +30,6 @@ pub fn nuclear_image(
 ) -> Result<Vec<u8>, DicomError> {
     scan.check()?;
     let [nx, ny, nz] = scan.shape;
-    let side = |length: usize| u16::try_from(length).map_err(|_| DicomError::TooLarge);
     let (columns, rows, slices) = (side(nx)?, side(ny)?, side(nz)?);
     let gates = side(volumes.len())?;
     let spacing = scan.frame.spacing();
@@ -65,13 +64,7 @@ pub fn nuclear_image(
     };
     let mut set = common(scan, &format!("DERIVED\\PRIMARY\\{kind}\\EMISSION"), counts);
     set.text(tags::DERIVATION_DESCRIPTION, derivation);
-    if let Some(images) = scan.images() {
-        let mut sources = images.processed();
-        for source in &mut sources {
-            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "NO");
-        }
-        set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
-    }
+    scan.put_sources(&mut set);
     set.items(tags::ROTATION_INFORMATION_SEQUENCE, Vec::new());
 
     let mut detector = DataSet::new();
@@ -142,7 +135,6 @@ pub fn nuclear_projections(
     description: &str,
 ) -> Result<Vec<u8>, DicomError> {
     scan.check()?;
-    let side = |length: usize| u16::try_from(length).map_err(|_| DicomError::TooLarge);
     let (columns, rows) = (side(projections.columns)?, side(projections.rows)?);
     let frames = projections.views.len();
     let each = frames / detectors.max(1);
@@ -219,6 +211,11 @@ const FACTS: ObjectFacts = ObjectFacts {
     description: "projections",
 };
 
+/// A number that has 16 bits in a file.
+fn side(length: usize) -> Result<u16, DicomError> {
+    u16::try_from(length).map_err(|_| DicomError::TooLarge)
+}
+
 /// A number from 1 of one from 0.
 fn number(at: usize) -> u16 {
     at as u16 + 1
@@ -257,11 +254,7 @@ fn put_pixels(set: &mut DataSet, [columns, rows]: [u16; 2], pixels: Vec<u8>) {
 
 /// The item that says how many counts a pixel's unit is.
 fn mapping(per_pixel: f32) -> DataSet {
-    const COUNTS: Code = Code {
-        value: "{counts}",
-        scheme: "UCUM",
-        meaning: "counts",
-    };
+    const COUNTS: Code = Code::new("{counts}", "UCUM", "counts");
     let mut item = DataSet::new();
     item.short(tags::REAL_WORLD_VALUE_FIRST_VALUE_MAPPED, 0);
     item.short(tags::REAL_WORLD_VALUE_LAST_VALUE_MAPPED, MOST as u16);

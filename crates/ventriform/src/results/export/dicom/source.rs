@@ -372,6 +372,17 @@ impl SourceScan {
         })
     }
 
+    /// The Source Image Sequence of an image whose pixels do not lie where those of the sources do.
+    pub(super) fn put_sources(&self, set: &mut DataSet) {
+        if let Some(images) = self.images() {
+            let mut sources = images.processed();
+            for source in &mut sources {
+                source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "NO");
+            }
+            set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
+        }
+    }
+
     /// The reference to the image or frame that slice `k` was read from.
     pub(super) fn slice_reference(&self, k: usize) -> Option<DataSet> {
         let p = &self.provenance;
