@@ -108,6 +108,11 @@ const SEGMENTATION_FILES: &[FileRow] = &[
         ALWAYS,
     ),
     row(
+        "projections.png",
+        "Two views, the sinogram and the linogram of raw projections",
+        "of a left ventricle fitted to raw projections",
+    ),
+    row(
         "region.nii.gz",
         "The scan about the organ, in 256 steps",
         ALWAYS,
