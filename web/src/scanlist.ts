@@ -5,6 +5,7 @@ import { type Page, Unreachable, type Volume, changedPage, fieldOf, get, page, r
 import type { Role } from "./pairing";
 import { Watched } from "./state";
 import { onTold, tellTabs } from "./tabs";
+import { isoDay } from "./words";
 
 export type Show = "all" | "segmentation" | "beat" | "model" | "comparison" | "nothing" | "unfinished" | "failed";
 export type Order = "newest" | "study_date" | "patient" | "name" | "largest";
@@ -156,6 +157,33 @@ function know(read: Volume[], gone: Set<string> = new Set()): void {
   volumes.value = [...read, ...volumes.value.filter(volume => !ids.has(volume.id) && !gone.has(volume.id))];
 }
 
+/** Of which patients and studies all scans were asked for since the list was opened. */
+const askedOf = new Map<string, Promise<void>>();
+let lastAsked: Promise<unknown> = Promise.resolve();
+
+/** Reads all scans of a scan's patient, or of its study: a page or a part of the list may hold only some of them. */
+export function loadCompany({ dicom }: Volume): Promise<void> {
+  const { patient_id: patient, study_uid: study, study_date } = dicom ?? {};
+  const day = isoDay(study_date ?? "");
+  const ofDay = { study_date_from: day, study_date_to: day };
+  const wanted = patient ? { patient, order: "study_date" } : study ? { study } : ofDay;
+  const key = JSON.stringify(wanted);
+  const known = askedOf.get(key);
+  if (known) return known;
+  // One after the other: a browser opens few connections, which previews and jobs need too.
+  const reading = lastAsked.then(() => readCompany(wanted));
+  lastAsked = reading.catch(() => askedOf.delete(key));
+  askedOf.set(key, reading);
+  return reading;
+}
+
+async function readCompany(wanted: Record<string, string>): Promise<void> {
+  const before = new Set(volumes.value.map(volume => volume.id));
+  const { items } = await page<Volume>("volumes", { ...wanted, limit: MOST_ROWS });
+  const now = new Set(volumes.value.map(volume => volume.id));
+  know(items.filter(volume => now.has(volume.id) || !before.has(volume.id)));
+}
+
 /** A scan that this tab has stored. */
 export function addStored(volume: Volume): void {
   stored.add(volume.id);
@@ -183,6 +211,7 @@ export function ask(change: Partial<Asked>): void {
 export function watchList(readMade: (results: boolean) => Promise<void>): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let [looks, ended, told] = [0, false, ""];
+  askedOf.clear();
   const round = async (results: boolean) => {
     clearTimeout(timer);
     try {

@@ -129,6 +129,45 @@ async function seriesOf(file: File): Promise<{ uid: string; frames: number } | n
   return uid ? { uid, frames } : null;
 }
 
+/** What the service says of files that hold no scan. */
+const FOREIGN = ["unrecognised-format", "unsupported-format", "single-slice", "empty-body"];
+
+/** Whether the service has found that the files are no scan. */
+export function isForeign({ state, problem }: Upload): boolean {
+  return state === "refused" && FOREIGN.includes(problem?.type.split(":").pop() ?? "");
+}
+
+export function isUnderWay({ state }: Upload): boolean {
+  return state === "waiting" || state === "sending" || state === "reading";
+}
+
+/** What was chosen or dropped together, as the list of uploads tells of it. */
+export interface Batch {
+  number: number;
+  /** What one sentence tells of. */
+  told: Upload[];
+  /** What has a line each. */
+  lines: Upload[];
+}
+
+/** The batches, the newest first. Of several with foreign files, one sentence tells what is stored and what is no scan. */
+export function batchesOf(all: Upload[]): Batch[] {
+  const numbers = [...new Set(all.map(upload => upload.batch))];
+  return numbers.map(number => {
+    const own = all.filter(upload => upload.batch === number);
+    const isTold = (upload: Upload) => isForeign(upload) || upload.state === "stored";
+    const told = own.length > 1 && own.some(isForeign) ? own.filter(isTold) : [];
+    return { number, told, lines: own.filter(upload => !told.includes(upload)) };
+  });
+}
+
+const stay = (event: BeforeUnloadEvent) => event.preventDefault();
+// Only while something is under way: a page that may ask is not kept for the way back.
+uploads.watch(() => {
+  const ask = uploads.value.some(isUnderWay) ? addEventListener : removeEventListener;
+  ask("beforeunload", stay);
+});
+
 let count = 0;
 let batches = 0;
 
@@ -215,14 +254,19 @@ async function send(upload: Upload): Promise<void> {
       rememberFileName(volume, upload.group.name);
       change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
       whenStored(volume);
-      const together = uploads.value.filter(other => other.batch === upload.batch);
-      if (together.every(other => other.state === "stored"))
-        whenAllStored(together.flatMap(other => other.volume ?? []));
     } else {
       change(upload.id, { state: "refused", problem: problemOf(answer.status, answer.text) });
     }
+    tellTogether(upload.batch);
     return;
   }
+}
+
+/** Tells of the scans that were sent together, once no other is to come. */
+function tellTogether(batch: number): void {
+  const together = uploads.value.filter(other => other.batch === batch);
+  const scans = together.filter(other => !isForeign(other));
+  if (scans.every(other => other.state === "stored")) whenAllStored(scans.flatMap(other => other.volume ?? []));
 }
 
 /** One request; null if it was cancelled or interrupted. Only XMLHttpRequest reports how much was sent. */
@@ -266,6 +310,6 @@ export function again(upload: Upload): void {
   void work();
 }
 
-export function dismiss(upload: Upload): void {
-  uploads.value = uploads.value.filter(other => other.id !== upload.id);
+export function dismiss(...some: Upload[]): void {
+  uploads.value = uploads.value.filter(other => !some.includes(other));
 }

@@ -47,6 +47,11 @@ export function titleOf(volume: Volume): string {
   return /^[\d.]{20,}$/.test(name) ? `UID ${name}` : name;
 }
 
+/** A day of DICOM as YYYY-MM-DD. */
+export function isoDay(day: string): string {
+  return day.replace(/^(\d{4})(\d\d)(\d\d)$/, "$1-$2-$3");
+}
+
 /**
  * Patient and study of a scan, as DICOM or the caller states them, identifiers with what they identify; `written`
  * shortens them.
@@ -54,7 +59,7 @@ export function titleOf(volume: Volume): string {
 export function study({ dicom }: Volume, written: (text: string) => string = text => text): string {
   if (!dicom) return "";
   const patient = dicom["patient_name"]?.replaceAll("^", " ").trim();
-  const date = dicom["study_date"]?.replace(/^(\d{4})(\d\d)(\d\d)$/, "$1-$2-$3");
+  const date = isoDay(dicom["study_date"] ?? "");
   const [id, accession] = [dicom["patient_id"], dicom["accession_number"]];
   const parts = [
     patient && written(patient),
@@ -79,7 +84,8 @@ export function bytes(count: number): string {
   return `${(count / 1e9).toFixed(2)} GB`;
 }
 
-const DAY = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
+const MINUTE = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
+const SECOND = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "medium" });
 
 /** The order of two things, the newest first. */
 export function newest(a: { created_at: string }, b: { created_at: string }): number {
@@ -87,7 +93,7 @@ export function newest(a: { created_at: string }, b: { created_at: string }): nu
 }
 
 export function moment(text: string): string {
-  return DAY.format(new Date(text));
+  return MINUTE.format(new Date(text));
 }
 
 export function number(value: unknown, digits = 1, unit = ""): string {
@@ -171,6 +177,22 @@ export function resultName(result: Result): string {
   }
   if (isComparison(result.id)) return "Rest and stress";
   return `Model, ${String(result.summary["vertices"])} points`;
+}
+
+const namesakes = (result: Result, among: Result[]) =>
+  among.filter(other => other.id !== result.id && resultName(other) === resultName(result));
+
+/** When a result was made: to the second if another of its name was made in the same minute. */
+export function timeOf(result: Result, among: Result[]): string {
+  const minute = moment(result.created_at);
+  const same = namesakes(result, among).some(other => moment(other.created_at) === minute);
+  return same ? SECOND.format(new Date(result.created_at)) : minute;
+}
+
+/** The name of a result among others of its scan: with its time if another has the same name. */
+export function nameAmong(result: Result, among: Result[]): string {
+  const name = resultName(result);
+  return namesakes(result, among).length > 0 ? `${name} of ${timeOf(result, among)}` : name;
 }
 
 export function ordinal(n: number): string {

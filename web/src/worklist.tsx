@@ -3,9 +3,8 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
-import { newerCorrections } from "./corrections";
 import { useDrop } from "./drop";
-import { JobLine, Trouble } from "./jobline";
+import { JobLine } from "./jobline";
 import {
   beats,
   comparisons,
@@ -22,10 +21,12 @@ import {
   trouble,
   volumes,
 } from "./library";
-import { offeredPair, pick, picked, statedPair, statedRole, studyKey } from "./pairing";
+import { byStudy, offeredPair, pairsOf, pick, picked, statedRole, studyKey } from "./pairing";
 import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
+import { ComparisonLink, ResultLink } from "./resultlink";
 import { open, route } from "./route";
+import { toldOf } from "./scankind";
 import {
   type Asked,
   type Order,
@@ -44,21 +45,18 @@ import {
   watchList,
 } from "./scanlist";
 import { useWatched } from "./state";
-import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
+import { StudyCard } from "./studycard";
+import { add, keepNames, onStored, uploads } from "./upload";
+import { Uploads } from "./uploadlist";
 import {
   acquisition,
   bytes,
   cut,
-  isBeat,
-  isComparison,
-  isFit,
   isGated,
   isLabelMap,
   moment,
   nameOf,
   newest,
-  number,
-  resultName,
   shape,
   study,
   titleOf,
@@ -172,81 +170,6 @@ function Drop({ then, onThen }: { then: Then; onThen: (then: Then) => void }) {
   );
 }
 
-const STATES: Record<Upload["state"], string> = {
-  waiting: "waits",
-  sending: "is sent",
-  reading: "is being read",
-  stored: "stored",
-  refused: "refused",
-  interrupted: "The connection broke before the service had everything. Nothing is lost: send it again.",
-  cancelled: "cancelled",
-};
-
-function Uploads() {
-  const all = useWatched(uploads);
-  if (all.length === 0) return null;
-  return (
-    <section aria-label="Uploads" class="uploads">
-      <ul>
-        {all.map(upload => {
-          const underway = upload.state === "waiting" || upload.state === "sending" || upload.state === "reading";
-          return (
-            <li key={upload.id} class={upload.state}>
-              <span class="name" title={upload.group.name}>
-                {cut(upload.group.name)}
-              </span>
-              <span class="quiet">
-                {bytes(upload.bytes)}
-                {upload.group.files.length > 1 && `, ${upload.group.files.length} files`}
-              </span>
-              {upload.state === "sending" && (
-                <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />
-              )}
-              <span
-                role="status"
-                class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
-                {upload.problem ? (
-                  <Trouble problem={upload.problem} />
-                ) : upload.existed ? (
-                  "was stored before"
-                ) : (
-                  STATES[upload.state]
-                )}
-              </span>
-              <span class="end">
-                {underway && (
-                  <button type="button" class="plain" onClick={() => stop(upload)}>
-                    Cancel
-                  </button>
-                )}
-                {(upload.state === "refused" || upload.state === "interrupted" || upload.state === "cancelled") && (
-                  <button type="button" onClick={() => again(upload)}>
-                    Send again
-                  </button>
-                )}
-                {upload.volume && (
-                  <button type="button" onClick={() => upload.volume && open(upload.volume.id)}>
-                    Open
-                  </button>
-                )}
-                {!underway && (
-                  <button
-                    type="button"
-                    class="plain"
-                    aria-label={`Take ${upload.group.name} off this list`}
-                    onClick={() => dismiss(upload)}>
-                    ✕
-                  </button>
-                )}
-              </span>
-            </li>
-          );
-        })}
-      </ul>
-    </section>
-  );
-}
-
 interface Row {
   volume: Volume;
   results: Result[];
@@ -282,7 +205,7 @@ function Scans() {
         .sort(newest),
     }));
   }, [all, known, of.search, allFits, allModels, allBeats, allJobs, allComparisons]);
-  const shown = byStudy(rows);
+  const cards = useMemo(() => byStudy(rows, row => row.volume), [rows]);
   if (!isLoaded)
     return problem ? (
       <p class="error pad">
@@ -326,7 +249,7 @@ function Scans() {
   }
   return (
     <section aria-label="Stored scans">
-      <Tools count={`${shown.length}${next ? "+" : ""} ${shown.length === 1 ? "scan" : "scans"}`} />
+      <Tools count={`${rows.length}${next ? "+" : ""} ${rows.length === 1 ? "scan" : "scans"}`} />
       {problem && (
         <p class="error" role="alert">
           {problem}
@@ -335,11 +258,11 @@ function Scans() {
       <Arrived />
       <Receiving />
       <ul class="scans">
-        {groupsOf(shown).map(group => (
-          <StudyRow key={group[0]!.volume.id} group={group} />
+        {cards.map(card => (
+          <Card key={keyOf(card)} rows={card} />
         ))}
       </ul>
-      {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
+      {rows.length === 0 && <p class="quiet pad">Nothing matches.</p>}
       {next && <More />}
     </section>
   );
@@ -487,79 +410,30 @@ function More() {
   );
 }
 
-/** Scans of one study follow the first of them. */
-function byStudy(rows: Row[]): Row[] {
-  const groups = new Map<string, Row[]>();
-  for (const row of rows) {
-    const key = studyKey(row.volume) ?? row.volume.id;
-    groups.set(key, [...(groups.get(key) ?? []), row]);
-  }
-  return [...groups.values()].flat();
-}
+const keyOf = ([first]: Row[]): string => (first && (studyKey(first.volume) ?? first.volume.id)) ?? "";
 
-/** Neighbours of one study. */
-function groupsOf(rows: Row[]): Row[][] {
-  const groups: Row[][] = [];
-  for (const row of rows) {
-    const last = groups.at(-1);
-    const key = studyKey(row.volume);
-    if (last && key !== null && studyKey(last[0]!.volume) === key) last.push(row);
-    else groups.push([row]);
-  }
-  return groups;
-}
-
-/** A scan, or those of one patient's study under its name, with what was compared. */
-function StudyRow({ group }: { group: Row[] }) {
-  const [first] = group;
+/** A patient's study with its scans in rows, or a scan of no study by itself. */
+function Card({ rows }: { rows: Row[] }) {
+  const known = useWatched(volumes);
+  const [first] = rows;
+  const key = first ? studyKey(first.volume) : null;
+  const scans = useMemo(() => known.filter(volume => studyKey(volume) === key), [known, key]);
   if (!first) return null;
-  if (group.length === 1) return <ScanRow row={first} compared={first.compared} alone />;
-  const ids = new Set(group.map(row => row.volume.id));
-  const inside = (made: Result) => ids.has(made.volume) && ids.has(String(made.parameters["rest"]));
-  const compared = [
-    ...new Map(
-      group
-        .flatMap(row => row.compared)
-        .filter(inside)
-        .map(made => [made.id, made]),
-    ).values(),
-  ];
-  const pair = statedPair(group.map(row => row.volume));
-  const whose = study(first.volume, cut);
+  if (key === null) return <ScanRow row={first} compared={first.compared} alone />;
+  const ids = new Set(scans.map(volume => volume.id));
+  const isInside = (made: Result) => ids.has(made.volume) && ids.has(String(made.parameters["rest"]));
+  const compared = new Map(rows.flatMap(row => row.compared.filter(isInside).map(made => [made.id, made])));
+  const { pairs } = pairsOf(scans);
+  const place = new Map(pairs.flatMap(pair => [pair.stress.id, pair.rest.id]).map((id, at) => [id, at]));
+  const placeOf = (row: Row) => place.get(row.volume.id) ?? place.size;
   return (
-    <li class="study">
-      <div class="study-head">
-        <h2 title={study(first.volume)}>{whose || "One study"}</h2>
-        {compared.map(made => (
-          <ComparisonLink key={made.id} made={made} />
+    <StudyCard studyKey={key} scans={scans} compared={[...compared.values()].sort(newest)}>
+      {rows
+        .toSorted((a, b) => placeOf(a) - placeOf(b))
+        .map(row => (
+          <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !isInside(made))} />
         ))}
-        {pair && (
-          <button
-            type="button"
-            class={compared.length ? "" : "main"}
-            onClick={() => {
-              picked.value = pair.map(volume => volume.id);
-              document.querySelector(".drop")?.scrollIntoView();
-            }}>
-            {compared.length ? "Compare again" : "Compare rest and stress"}
-          </button>
-        )}
-      </div>
-      <ul class="scans">
-        {group.map(row => (
-          <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !inside(made))} />
-        ))}
-      </ul>
-    </li>
-  );
-}
-
-function ComparisonLink({ made }: { made: Result }) {
-  return (
-    <a class="result" href={`#/comparison/${made.id}`}>
-      <b>{resultName(made)}</b> {figures(made)}
-      {newerCorrections(made).length > 0 && <span class="quiet"> older than a correction</span>}
-    </a>
+    </StudyCard>
   );
 }
 
@@ -579,6 +453,7 @@ function ScanRow({
   const [state, setState] = useState("");
   const name = nameOf(volume);
   const labels = Object.entries(volume.labels).filter(([label]) => label !== "name");
+  const made = [...acquisition(volume), toldOf(volume)].filter(Boolean).join(" · ");
   useEffect(() => loadResultsOf(volume.id), [volume.id]);
   const start = (kind: Kind) => () => {
     setProblem("");
@@ -597,7 +472,7 @@ function ScanRow({
           {role && <span class={`role ${role}`}>{role}</span>}
         </span>
         {alone && study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
-        {acquisition(volume).length > 0 && <span>{acquisition(volume).join(" · ")}</span>}
+        {made && <span>{made}</span>}
         <span class="quiet">
           {moment(volume.created_at)} · {bytes(volume.bytes)} · {volume.format} · {shape(volume)}
           {isLabelMap(volume) && " · label map"}
@@ -622,9 +497,7 @@ function ScanRow({
           <ComparisonLink key={made.id} made={made} />
         ))}
         {results.slice(0, 4).map(result => (
-          <a key={result.id} class="result" href={`#/scan/${volume.id}/${result.id}`}>
-            <b>{resultName(result)}</b> {figures(result)}
-          </a>
+          <ResultLink key={result.id} result={result} among={results} />
         ))}
         {results.length > 4 && (
           <a class="result" href={`#/scan/${volume.id}`}>
@@ -685,53 +558,4 @@ function ScanRow({
       </div>
     </li>
   );
-}
-
-function figures(result: Result) {
-  const { summary } = result;
-  if (isComparison(result.id)) {
-    const { sss, sds, ef_change_points: change } = summary;
-    return (
-      <>
-        <span>
-          TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}
-          {sss != null && `, SSS ${sss}, SDS ${sds}`}
-          {change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}
-        </span>
-        <Doubts count={summary.flags?.length ?? 0} />
-      </>
-    );
-  }
-  if (isBeat(result.id))
-    return (
-      <>
-        <span>
-          EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV{" "}
-          {number(summary.esv_ml, 0, "ml")}
-        </span>
-        <Doubts count={summary.flags?.length ?? 0} />
-      </>
-    );
-  if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
-  const given = summary.volumes_ml;
-  const volumesMl = given?.anatomical ?? given;
-  return (
-    <>
-      <span>
-        cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}
-      </span>
-      <Doubts count={summary.flags?.length ?? 0} />
-    </>
-  );
-}
-
-function Doubts({ count }: { count: number }) {
-  return count > 0 ? (
-    <>
-      <span>{" · "}</span>
-      <span class="warning">
-        {count} {count === 1 ? "doubt" : "doubts"}
-      </span>
-    </>
-  ) : null;
 }

@@ -60,11 +60,12 @@ function head(kind, instance) {
   return [Buffer.alloc(128), Buffer.from("DICM"), element(0x00020000, "UL", length), ...meta];
 }
 
-function image([nx, ny], steps) {
+function image([nx, ny], steps, corrected = null) {
   return [
     element(0x00280010, "US", ny),
     element(0x00280011, "US", nx),
     element(0x00280030, "DS", [number(Math.abs(steps[1])), number(Math.abs(steps[0]))]),
+    ...(corrected ? [element(0x00280051, "CS", corrected)] : []),
     element(0x00280100, "US", 16),
     element(0x00280101, "US", 16),
     element(0x00280102, "US", 15),
@@ -72,7 +73,10 @@ function image([nx, ny], steps) {
   ];
 }
 
-/** `series`: number, description and tracer of one series of several in a study. */
+/**
+ * `series`: number, description and tracer of one series of several in a study; also its corrections, the position of the
+ * patient, and the number and the day of another study.
+ */
 export function nm(nifti, patient, id = "PH7", series = null) {
   const scan = scanOf(nifti);
   return nmFile(
@@ -93,7 +97,8 @@ export function nm(nifti, patient, id = "PH7", series = null) {
 /** An NM file with the elements that say how its frames are counted, and those of each frame. */
 function nmFile({ shape, pixels, steps, origin, id = "PH7", series = null }, patient, type, counted, vectors) {
   const kind = "1.2.840.10008.5.1.4.1.1.20";
-  const of = series ? `.${series.number}` : "";
+  const study = series?.study ?? 1;
+  const of = series ? `.${study}.${series.number}` : "";
   const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
   return Buffer.concat([
     ...head(kind, `${ROOT}.7.3${of}`),
@@ -101,7 +106,7 @@ function nmFile({ shape, pixels, steps, origin, id = "PH7", series = null }, pat
     element(0x00080008, "CS", ["DERIVED", "PRIMARY", type, "EMISSION"]),
     element(0x00080016, "UI", kind),
     element(0x00080018, "UI", `${ROOT}.7.3${of}`),
-    element(0x00080020, "DA", "20250115"),
+    element(0x00080020, "DA", series?.day ?? "20250115"),
     element(0x00080050, "SH", "ACC7"),
     element(0x00080060, "CS", "NM"),
     ...(series ? [element(0x0008103e, "LO", series.description)] : []),
@@ -109,13 +114,14 @@ function nmFile({ shape, pixels, steps, origin, id = "PH7", series = null }, pat
     element(0x00100020, "LO", id),
     element(0x00180050, "DS", number(Math.abs(steps[2]))),
     element(0x00180088, "DS", number(steps[2] * Math.sign(steps[0] * steps[1]))),
-    element(0x0020000d, "UI", `${ROOT}.7.1`),
+    ...(series?.position ? [element(0x00185100, "CS", series.position)] : []),
+    element(0x0020000d, "UI", `${ROOT}.7.${study}`),
     element(0x0020000e, "UI", `${ROOT}.7.2${of}`),
     element(0x00200052, "UI", `${ROOT}.7.4`),
     element(0x00280002, "US", 1),
     element(0x00280004, "CS", "MONOCHROME2"),
     ...counted,
-    ...image(shape, steps),
+    ...image(shape, steps, series?.corrected),
     ...(series ? [element(0x00540016, "SQ", item(element(0x00180031, "LO", series.tracer)))] : []),
     element(
       0x00540022,
@@ -240,8 +246,8 @@ export function gated(nifti, truth, gates, rr = 900) {
   return gzipSync(Buffer.concat([header, ...beat(nifti, truth, gates).map(voxels => Buffer.from(voxels.buffer))]));
 }
 
-/** The same beat as a gated NM file. */
-export function gatedNm(nifti, truth, gates, patient, rr = 900) {
+/** The same beat as a gated NM file; `series` as of `nm`. */
+export function gatedNm(nifti, truth, gates, patient, { rr = 900, id, series } = {}) {
   const scan = scanOf(nifti);
   const frames = Array.from({ length: gates * scan.shape[2] }, (_, n) => [
     Math.floor(n / scan.shape[2]) + 1,
@@ -255,7 +261,7 @@ export function gatedNm(nifti, truth, gates, patient, rr = 900) {
     element(0x00181084, "IS", 12),
   );
   return nmFile(
-    { ...scan, pixels },
+    { ...scan, pixels, id, series },
     patient,
     "RECON GATED TOMO",
     [element(0x00280008, "IS", frames.length), element(0x00280009, "AT", [0x00540060, 0x00540070, 0x00540080])],

@@ -17,6 +17,7 @@ import { comparisons } from "./comparison.mjs";
 import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 import { start } from "./service.mjs";
+import { studies } from "./study.mjs";
 
 const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -152,7 +153,9 @@ async function look(page, name) {
   };
   await run(AXE);
   const text = await run(
-    "axe.run().then(r => JSON.stringify(r.violations" +
+    // Rules that axe leaves off by itself.
+    "axe.run({ rules: { 'target-size': { enabled: true }, 'empty-table-header': { enabled: true } } })" +
+      ".then(r => JSON.stringify(r.violations" +
       ".map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))",
   );
   assert.deepEqual(JSON.parse(text), [], name);
@@ -622,7 +625,9 @@ async function main() {
     await own.stop();
   });
 
-  await comparisons({ PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose });
+  const tools = { PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose };
+  await comparisons(tools);
+  await studies(tools);
 
   await check("the documentation of the API", async () => {
     for (const [width, dark] of [
@@ -742,6 +747,53 @@ async function main() {
     await look(page, "two-models-1280");
     assert.deepEqual(faults, []);
     await close();
+  });
+
+  await check("two fits of a scan are told apart in lists and menus", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForSelector(".welcome");
+    await page.getByLabel("then").selectOption("nothing");
+    await choose(page, SCAN);
+    await page.waitForSelector(".uploads .stored");
+    const ask = async (path, order) => {
+      const body = order && {
+        method: "POST",
+        headers: { "content-type": "application/json" },
+        body: JSON.stringify(order),
+      };
+      return (await fetch(own.address + path, body)).json();
+    };
+    const volume = (await ask("/v1/volumes")).volumes[0].id;
+    for (const parameters of [{}, { margin: 1 }, { margin: 2 }, { margin: 3, roll: 5 }]) {
+      let job = await ask("/v1/jobs", { kind: "segmentation", volume, parameters });
+      while (!/succeeded|failed|cancelled/.test(job.state)) job = await ask(job.links.self);
+      assert.equal(job.state, "succeeded", JSON.stringify(job.error));
+    }
+    await page.reload();
+    const apart = async (where, count) => {
+      await page.waitForFunction(([where, count]) => document.querySelectorAll(where).length === count, [where, count]);
+      const names = await page.locator(where).allTextContents();
+      assert.equal(new Set(names).size, count, names.join("; "));
+      return names;
+    };
+    const names = await apart(".scan .result b", 4);
+    assert.equal(names.filter(name => /^Fit of .*\d/.test(name)).length, 3, names.join("; "));
+    assert.equal(names.filter(name => name === "Corrected fit").length, 1, names.join("; "));
+    await look(page, "fits-1280");
+    await page.goto(`${own.address}/#/scan/${volume}`);
+    await drawn(page);
+    await apart(".choices .pick", 4);
+    const labels = await page
+      .locator(".choices button[aria-label^=Compare]")
+      .evaluateAll(all => all.map(one => one.getAttribute("aria-label")));
+    assert.equal(new Set(labels).size, 3, labels.join("; "));
+    await page.getByRole("button", { name: "New fit or model" }).click();
+    await page.waitForSelector("#parameter-model");
+    await apart("#parameter-model optgroup[label='Fits of this scan'] option", 4);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
   });
 
   await check("a DICOM NM file is read, named and fitted", async () => {
@@ -932,12 +984,53 @@ async function main() {
     const text = join(SCREENSHOTS, "notes.txt");
     writeFileSync(text, "not a scan\n".repeat(50));
     await page.waitForSelector(".drop");
-    await choose(page, text, SCAN);
+    await choose(page, text);
     await page.waitForSelector(".uploads .refused .error strong");
+    await choose(page, SCAN);
     await page.waitForSelector(".uploads .stored");
     await look(page, "refused-1280");
     assert.deepEqual(faults, []);
     await close();
+  });
+
+  await check("of a folder with foreign files, one sentence tells, which shows them when asked", async () => {
+    const own = await service();
+    const folder = join(SCREENSHOTS, "foreign");
+    mkdirSync(join(folder, "notes"), { recursive: true });
+    cpSync(SCAN, join(folder, "spect.nii.gz"));
+    cpSync(TRUTH, join(folder, "truth.nii.gz"));
+    for (const name of ["report.txt", "notes/first.csv", "notes/second.csv"])
+      writeFileSync(join(folder, name), `${name} is not a scan\n`.repeat(50));
+    for (const [width, dark] of [
+      [1280, false],
+      [390, true],
+    ]) {
+      const { page, faults, close } = await tab(browser, own.address, { width, dark, expected: [/status of 422/] });
+      await page.waitForSelector(".drop");
+      await page.getByLabel("then").selectOption("nothing");
+      await page.setInputFiles("input[aria-label='Folder of scans']", folder);
+      const stored = width === 1280 ? "2 scans stored" : "2 scans were stored before";
+      await page.getByText(`${stored}, 3 files are no scans:`, { exact: true }).waitFor();
+      assert.equal(await page.locator(".uploads li").count(), 1);
+      const show = page.getByRole("button", { name: "show the files that are no scans" });
+      assert.equal(await page.getByText("first.csv").count(), 0);
+      await look(page, `foreign-folded-${width}`);
+      await show.press("Enter");
+      for (const name of ["report.txt", "first.csv", "second.csv"])
+        assert.match(
+          await page.locator(".foreign div", { hasText: name }).textContent(),
+          /not in a known volume format: it begins with/,
+        );
+      await look(page, `foreign-shown-${width}`);
+      // The scans among them are offered for a comparison as without the foreign files; a mask is none.
+      assert.equal(await page.locator(".pair-form").count(), 0);
+      await page.getByRole("button", { name: "Take these files off this list" }).click();
+      assert.equal(await page.locator(".uploads").count(), 0);
+      assert.equal(await page.locator(".scan").count(), 2);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
   });
 
   await check("a file over the limit is not sent", async () => {
@@ -998,6 +1091,12 @@ async function main() {
     await choose(page, large, TRUTH);
     await page.waitForFunction(() => document.querySelector(".uploads .sending progress")?.value > 0);
     await look(page, "sending-1280");
+    // Whoever leaves the page is asked, and stays.
+    await page.locator("body").click({ position: { x: 5, y: 5 } });
+    const question = page.waitForEvent("dialog");
+    await page.close({ runBeforeUnload: true });
+    assert.equal((await question).type(), "beforeunload");
+    await (await question).dismiss();
     // What waits is cancelled as what is sent.
     const stored = async () => (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes.length;
     await page.locator(".uploads .waiting").getByRole("button", { name: "Cancel" }).click();
@@ -1011,6 +1110,12 @@ async function main() {
     await page.getByRole("button", { name: "Take lv_truth.nii.gz off this list" }).click();
     await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 0);
     rmSync(large);
+    // Nothing is under way any more: nobody is asked.
+    let asked = 0;
+    page.on("dialog", dialog => ++asked && dialog.accept());
+    await page.reload();
+    await page.waitForSelector(".scan");
+    assert.equal(asked, 0);
     assert.deepEqual(faults, []);
     await close();
   });

@@ -1,0 +1,72 @@
+// Links to results, with their leading figures.
+
+import type { Result } from "./api";
+import { newerCorrections } from "./corrections";
+import { isBeat, isComparison, isFit, nameAmong, number, resultName } from "./words";
+
+export function ComparisonLink({ made }: { made: Result }) {
+  return (
+    <a class="result" href={`#/comparison/${made.id}`}>
+      <b>{resultName(made)}</b> {figures(made)}
+      {newerCorrections(made).length > 0 && <span class="quiet"> older than a correction</span>}
+    </a>
+  );
+}
+
+/** A link to a result of a scan, named apart from the others. */
+export function ResultLink({ result, among }: { result: Result; among: Result[] }) {
+  return (
+    <a class="result" href={`#/scan/${result.volume}/${result.id}`}>
+      <b>{nameAmong(result, among)}</b> {figures(result)}
+    </a>
+  );
+}
+
+function figures(result: Result) {
+  const { summary } = result;
+  if (isComparison(result.id)) {
+    const { sss, sds, ef_change_points: change } = summary;
+    return (
+      <>
+        <span>
+          TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}
+          {sss != null && `, SSS ${sss}, SDS ${sds}`}
+          {change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}
+        </span>
+        <Doubts count={summary.flags?.length ?? 0} />
+      </>
+    );
+  }
+  if (isBeat(result.id))
+    return (
+      <>
+        <span>
+          EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV{" "}
+          {number(summary.esv_ml, 0, "ml")}
+        </span>
+        <Doubts count={summary.flags?.length ?? 0} />
+      </>
+    );
+  if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
+  const given = summary.volumes_ml;
+  const volumesMl = given?.anatomical ?? given;
+  return (
+    <>
+      <span>
+        cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}
+      </span>
+      <Doubts count={summary.flags?.length ?? 0} />
+    </>
+  );
+}
+
+function Doubts({ count }: { count: number }) {
+  return count > 0 ? (
+    <>
+      <span>{" · "}</span>
+      <span class="warning">
+        {count} {count === 1 ? "doubt" : "doubts"}
+      </span>
+    </>
+  ) : null;
+}
