@@ -8,7 +8,7 @@ import { areOfTwoPatients, picked, statedRole, stressOf } from "./pairing";
 import { type Draft, ParameterForm, parameterSpecs, valuesOf } from "./parameters";
 import { openComparison } from "./route";
 import { useWatched } from "./state";
-import { acquisition, cut, moment, nameOf, resultName, study } from "./words";
+import { acquisition, cut, moment, nameOf, resultName, study, timeOf } from "./words";
 import { fileComparison } from "./work";
 
 const TOLD = {
@@ -172,7 +172,7 @@ function FitChoice({ name, fits, chosen, onChoice }: FitChoiceProps) {
         onChange={event => onChoice(event.currentTarget.value)}>
         {fits.map(fit => (
           <option key={fit.id} value={fit.id}>
-            {resultName(fit)}, {moment(fit.created_at)}
+            {resultName(fit)}, {timeOf(fit, fits)}
           </option>
         ))}
         <option value="">no earlier fit</option>

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { type Kind, type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
 import { fits, models, normals, templates, volumes } from "./library";
 import { useWatched } from "./state";
-import { cut, isLabelMap, moment, nameOf } from "./words";
+import { cut, isLabelMap, nameOf, resultName, timeOf } from "./words";
 
 interface Schema {
   type?: string | string[];
@@ -421,7 +421,7 @@ function ModelChoice({ common, text, onText, volume }: ChoiceProps) {
         <optgroup label="Models">
           {known.map(item => (
             <option key={item.id} value={item.id}>
-              {String(item.summary["vertices"])} points, {moment(item.created_at)}
+              {String(item.summary["vertices"])} points, {timeOf(item, known)}
             </option>
           ))}
         </optgroup>
@@ -430,7 +430,7 @@ function ModelChoice({ common, text, onText, volume }: ChoiceProps) {
         <optgroup label="Fits of this scan">
           {own.map(item => (
             <option key={item.id} value={item.id}>
-              fit of {moment(item.created_at)}
+              {resultName(item)} of {timeOf(item, own)}
             </option>
           ))}
         </optgroup>

@@ -24,7 +24,20 @@ import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "..
 import { home, isAt, open, openComparison, route } from "../route";
 import { useWatched } from "../state";
 import { file, isFiledHere } from "../work";
-import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study, titleOf } from "../words";
+import {
+  isBeat,
+  isFit,
+  isGated,
+  kindOf,
+  moment,
+  nameAmong,
+  nameOf,
+  resultName,
+  shape,
+  study,
+  timeOf,
+  titleOf,
+} from "../words";
 import { BeatCharts, BeatMaps, PerfusionView } from "./beatview";
 import { LUT, UPTAKE, WALL_LUT, kept } from "./colours";
 import { Correction } from "./correction";
@@ -331,7 +344,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
                 aria-pressed={result.id === current}
                 onClick={() => open(volume.id, result.id, otherId === result.id ? null : otherId)}>
                 <b>{resultName(result)}</b>
-                <span class="quiet">{moment(result.created_at)}</span>
+                <span class="quiet">{timeOf(result, results)}</span>
                 <Origin result={result} jobs={own} results={results} />
               </button>
               {current && result.id !== current && (
@@ -339,14 +352,14 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
                   type="button"
                   class="plain"
                   aria-pressed={result.id === otherId}
-                  aria-label={`Compare with ${resultName(result)} of ${moment(result.created_at)}`}
+                  aria-label={`Compare with ${resultName(result)} of ${timeOf(result, results)}`}
                   onClick={() => open(volume.id, current, result.id === otherId ? null : result.id)}>
                   {result.id === otherId ? "Stop comparing" : "Compare"}
                 </button>
               )}
               {result.id === current && (
                 <Confirm
-                  label={`Erase ${resultName(result)}`}
+                  label={`Erase ${nameAmong(result, results)}`}
                   question="Erase this result?"
                   act={() => eraseResult(result.id).then(() => open(volume.id))}>
                   Erase
@@ -458,7 +471,7 @@ function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; r
   return (
     <span class="quiet">
       by hand: {changed}
-      {labels["parent"] && `; from ${parent ? `the fit of ${moment(parent.created_at)}` : "a fit that was erased"}`}
+      {labels["parent"] && `; from ${parent ? `the fit of ${timeOf(parent, results)}` : "a fit that was erased"}`}
     </span>
   );
 }
@@ -483,7 +496,7 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
           {other?.polar && other.heart && (
             <details open>
               <summary>
-                Compared: {resultName(other.result)}, {moment(other.result.created_at)}
+                Compared: {resultName(other.result)}, {timeOf(other.result, [shown.result])}
               </summary>
               <PolarView scene={scene} map={other.polar} mesh={other.mesh} heart={other.heart} title="Compared fit" />
             </details>
