@@ -157,7 +157,7 @@ const PICK = "pick the two to compare";
 function whyUnpaired(images: Volume[], left: Record<Role, Volume[]>): string[] {
   const why = (role: Role, other: Role): string[] => {
     if (left[role].length === 0) return [];
-    if (!images.some(image => statedRole(image) === other)) return [`No scan at ${other} is stored.`];
+    if (!images.some(image => statedRole(image) === other)) return [`This study has no scan at ${other}.`];
     return left[role].map(scan => {
       const kind = kindOf([scan], images);
       if (left[other].some(one => mayBeSame(scan, one)))

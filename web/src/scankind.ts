@@ -45,12 +45,19 @@ function areProjections({ dicom }: Volume): boolean | null {
   return type ? type === "TOMO" || type === "GATED TOMO" : null;
 }
 
+/** Whether a scan is of PET; null where it may be of PET or SPECT. */
+function isPet({ dicom }: Volume): boolean | null {
+  const modality = dicom?.modality?.trim();
+  return modality ? modality === "PT" : null;
+}
+
 /** What is told of a scan, the most telling first. */
 export const KINDS: Kind[] = [
   { words: ["gated", "not gated"], first: true, inRow: () => false, of: volume => volume.gates != null },
   { words: ["attenuation corrected", "not corrected"], first: true, inRow: () => true, of: isCorrected },
   { words: ["prone", "supine"], first: false, inRow: is => is, of: isProne },
   { words: ["projections", "slices"], first: false, inRow: is => is, of: areProjections },
+  { words: ["PET", "SPECT"], first: false, inRow: () => false, of: isPet },
 ];
 
 const word = (kind: Kind, volume: Volume): string[] => {

@@ -148,7 +148,12 @@ export interface Batch {
   told: Upload[];
   /** What has a line each. */
   lines: Upload[];
+  /** What waits behind these. */
+  behind: Upload[];
 }
+
+/** Most waiting scans of a batch with a line each. */
+const MOST_WAITING = 5;
 
 /** The batches, the newest first. Of several with foreign files, one sentence tells what is stored and what is no scan. */
 export function batchesOf(all: Upload[]): Batch[] {
@@ -157,7 +162,9 @@ export function batchesOf(all: Upload[]): Batch[] {
     const own = all.filter(upload => upload.batch === number);
     const isTold = (upload: Upload) => isForeign(upload) || upload.state === "stored";
     const told = own.length > 1 && own.some(isForeign) ? own.filter(isTold) : [];
-    return { number, told, lines: own.filter(upload => !told.includes(upload)) };
+    const behind = own.filter(upload => upload.state === "waiting").slice(MOST_WAITING);
+    const apart = new Set([...told, ...behind]);
+    return { number, told, lines: own.filter(upload => !apart.has(upload)), behind };
   });
 }
 

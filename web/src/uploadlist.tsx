@@ -24,9 +24,10 @@ export function Uploads() {
   return (
     <section aria-label="Uploads" class="uploads">
       <ul>
-        {batchesOf(all).flatMap(({ number, told, lines }) => [
+        {batchesOf(all).flatMap(({ number, told, lines, behind }) => [
           told.length > 0 && <Told key={`batch ${number}`} uploads={told} />,
           ...lines.map(upload => <Line key={upload.id} upload={upload} />),
+          behind.length > 0 && <Behind key={`behind ${number}`} uploads={behind} />,
         ])}
       </ul>
     </section>
@@ -80,6 +81,19 @@ function Told({ uploads: told }: { uploads: Upload[] }) {
           ))}
         </dl>
       )}
+    </li>
+  );
+}
+
+function Behind({ uploads: behind }: { uploads: Upload[] }) {
+  return (
+    <li class="waiting">
+      <span>{counted(behind.length, "more waits", "more wait")}</span>
+      <span class="end">
+        <button type="button" class="plain" aria-label="Cancel these too" onClick={() => behind.forEach(stop)}>
+          Cancel
+        </button>
+      </span>
     </li>
   );
 }

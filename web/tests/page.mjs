@@ -1080,6 +1080,31 @@ async function main() {
     await close();
   });
 
+  await check("of many files that wait, the last are told of in one line", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    let go;
+    const held = new Promise(done => (go = done));
+    await page.route("**/v1/volumes*", async route => {
+      if (route.request().method() === "POST") await held;
+      await route.continue();
+    });
+    await page.waitForSelector(".welcome");
+    await page.getByLabel("then").selectOption("nothing");
+    const files = Array.from({ length: 10 }, (_, n) => ({ name: `s${n}.nii`, mimeType: "", buffer: small(n + 1) }));
+    await choose(page, ...files);
+    await page.getByText("4 more wait").waitFor();
+    assert.equal(await page.locator(".uploads li").count(), 7);
+    await look(page, "waiting-1280");
+    await page.getByRole("button", { name: "Cancel these too" }).click();
+    await page.waitForFunction(() => document.querySelectorAll(".uploads .cancelled").length === 4);
+    go();
+    await page.waitForFunction(() => document.querySelectorAll(".uploads .stored").length === 6);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
   await check("an upload is cancelled and sent again", async () => {
     const own = await service();
     const line = await fragile(own.address, 900_000, { holds: true });

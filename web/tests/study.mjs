@@ -17,6 +17,8 @@ const SERIES = {
   "corrected stress": { number: 5, description: "Stress IRAC", position: "HFS", corrected: ["ATTN", "SCAT"] },
   "corrected rest": { number: 6, description: "Rest IRAC", position: "HFS", corrected: ["ATTN", "SCAT"] },
   "prone stress": { number: 7, description: "Stress NAC prone", position: "HFP" },
+  "gated rest again": { number: 10, description: "Gated rest", position: "HFS" },
+  neither: { number: 11, description: "Cardiac", position: "HFS" },
   "earlier stress": { number: 8, description: "Stress", study: 2, day: "20240110" },
   "earlier rest": { number: 9, description: "Rest", study: 2, day: "20240110" },
 };
@@ -169,6 +171,34 @@ export async function studies(tools) {
     await shown(1, 0);
     await state([one, other]);
     await shown(2, 0);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
+  await check("why scans of a study are not paired is said in a sentence", async () => {
+    const files = made(tools);
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    await page.waitForSelector(".welcome");
+    const said = async (name, sentence) => {
+      await store(own.address, files[name]);
+      await page.reload();
+      await page.locator(".study > p", { hasText: sentence }).waitFor();
+    };
+    await said("gated stress", /^This study has no scan at rest\.$/);
+    await said(
+      "rest",
+      /^The scan at stress \(gated\) has no such scan at rest\. The scan at rest \(not gated, .*\) has /,
+    );
+    await said("gated rest", /^The scan at rest \(not gated, not corrected\) has no such scan at stress\.$/);
+    assert.deepEqual(await buttons(study(page, "2025-01-15")), ["Compare rest and stress"]);
+    await said(
+      "gated rest again",
+      /^More than one pair is possible \(gated\): pick the two to compare\. The scan at rest/,
+    );
+    assert.deepEqual(await buttons(study(page, "2025-01-15")), []);
+    await said("neither", / 1 scan says neither rest nor stress: pick the two to compare\.$/);
     assert.deepEqual(faults, []);
     await close();
     await own.stop();
