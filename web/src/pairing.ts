@@ -60,15 +60,15 @@ export function studyKey({ dicom }: Volume): string | null {
   return patient && dicom?.study_date ? `${patient}\n${dicom.study_date}` : null;
 }
 
-/** What is grouped by the study of its scan; what is of no study is alone. */
-export function byStudy<T>(items: T[], volumeOf: (item: T) => Volume): T[][] {
+/** What belongs to the scans of each study, by its key; a scan of no study is alone under its id. */
+export function byStudy<T>(items: T[], volumeOf: (item: T) => Volume): Map<string, T[]> {
   const groups = new Map<string, T[]>();
   for (const item of items) {
     const volume = volumeOf(item);
     const key = studyKey(volume) ?? volume.id;
     groups.set(key, [...(groups.get(key) ?? []), item]);
   }
-  return [...groups.values()];
+  return groups;
 }
 
 /** When a study was, as texts that sort; empty if the header does not say the day. */
@@ -87,7 +87,7 @@ export function earlierStudies(volume: Volume, known: Volume[]): Volume[][] {
       timeOfStudy(other) < time,
   );
   const latest = (a: Volume, b: Volume) => timeOfStudy(b).localeCompare(timeOfStudy(a));
-  return byStudy(before.sort(latest), other => other);
+  return [...byStudy(before.sort(latest), other => other).values()];
 }
 
 /** Whether the headers name two patients by number. */
@@ -177,6 +177,7 @@ export function offeredPair(volumes: Volume[]): [Volume, Volume] | null {
   const images = volumes.filter(volume => !isLabelMap(volume));
   const [a, b, ...more] = images;
   if (a && b && more.length === 0 && a.id !== b.id) return [a, b];
-  const [first, ...others] = byStudy(images, volume => volume).flatMap(study => pairsOf(study).pairs.slice(0, 1));
+  const studies = [...byStudy(images, volume => volume).values()];
+  const [first, ...others] = studies.flatMap(study => pairsOf(study).pairs.slice(0, 1));
   return first && others.length === 0 ? [first.stress, first.rest] : null;
 }

@@ -181,7 +181,9 @@ async function readCompany(wanted: Record<string, string>): Promise<void> {
   const before = new Set(volumes.value.map(volume => volume.id));
   const { items } = await page<Volume>("volumes", { ...wanted, limit: MOST_ROWS });
   const now = new Set(volumes.value.map(volume => volume.id));
-  know(items.filter(volume => now.has(volume.id) || !before.has(volume.id)));
+  // What was known before and is not now was erased meanwhile.
+  const fresh = items.filter(volume => !now.has(volume.id) && !before.has(volume.id));
+  if (fresh.length > 0) volumes.value = [...volumes.value, ...fresh];
 }
 
 /** A scan that this tab has stored. */

@@ -4,23 +4,25 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import type { Result, Volume } from "./api";
 import { volumes } from "./library";
-import { type StudyPair, earlierStudies, pairsOf, picked, studyKey } from "./pairing";
+import { type Pairing, type StudyPair, earlierStudies, picked, studyKey } from "./pairing";
 import { ComparisonLink } from "./resultlink";
 import { loadCompany } from "./scanlist";
 import { useWatched } from "./state";
 import { cut, isoDay, study } from "./words";
 
 interface Props {
-  studyKey: string;
+  /** The key of the study. */
+  name: string;
   /** All scans of the study that are known, also those that the list does not show. */
   scans: Volume[];
+  pairing: Pairing;
   /** What was compared within the study, the newest first. */
   compared: Result[];
   /** The rows. */
   children: ComponentChildren;
 }
 
-export function StudyCard({ studyKey: key, scans, compared, children }: Props) {
+export function StudyCard({ name, scans, pairing: { pairs, unpaired }, compared, children }: Props) {
   const known = useWatched(volumes);
   const [isComplete, setComplete] = useState(false);
   const [first] = scans;
@@ -30,14 +32,13 @@ export function StudyCard({ studyKey: key, scans, compared, children }: Props) {
         () => setComplete(true),
         () => undefined,
       );
-  }, [key]);
+  }, [name]);
   if (!first) return null;
-  const { pairs, unpaired } = pairsOf(scans);
   const isOf = ({ stress, rest }: StudyPair, made: Result) =>
     made.volume === stress.id && made.parameters["rest"] === rest.id;
   const others = compared.filter(made => !pairs.some(pair => isOf(pair, made)));
   return (
-    <li class="study" data-study={key}>
+    <li class="study" data-study={name}>
       <div class="study-head">
         <h2 tabIndex={-1} title={study(first)}>
           {study(first, cut) || "One study"}

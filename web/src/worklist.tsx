@@ -205,7 +205,7 @@ function Scans() {
         .sort(newest),
     }));
   }, [all, known, of.search, allFits, allModels, allBeats, allJobs, allComparisons]);
-  const cards = useMemo(() => byStudy(rows, row => row.volume), [rows]);
+  const cards = useMemo(() => [...byStudy(rows, row => row.volume)], [rows]);
   if (!isLoaded)
     return problem ? (
       <p class="error pad">
@@ -258,8 +258,8 @@ function Scans() {
       <Arrived />
       <Receiving />
       <ul class="scans">
-        {cards.map(card => (
-          <Card key={keyOf(card)} rows={card} />
+        {cards.map(([key, card]) => (
+          <Card key={key} rows={card} />
         ))}
       </ul>
       {rows.length === 0 && <p class="quiet pad">Nothing matches.</p>}
@@ -410,8 +410,6 @@ function More() {
   );
 }
 
-const keyOf = ([first]: Row[]): string => (first && (studyKey(first.volume) ?? first.volume.id)) ?? "";
-
 /** A patient's study with its scans in rows, or a scan of no study by itself. */
 function Card({ rows }: { rows: Row[] }) {
   const known = useWatched(volumes);
@@ -423,11 +421,11 @@ function Card({ rows }: { rows: Row[] }) {
   const ids = new Set(scans.map(volume => volume.id));
   const isInside = (made: Result) => ids.has(made.volume) && ids.has(String(made.parameters["rest"]));
   const compared = new Map(rows.flatMap(row => row.compared.filter(isInside).map(made => [made.id, made])));
-  const { pairs } = pairsOf(scans);
-  const place = new Map(pairs.flatMap(pair => [pair.stress.id, pair.rest.id]).map((id, at) => [id, at]));
+  const pairing = pairsOf(scans);
+  const place = new Map(pairing.pairs.flatMap(pair => [pair.stress.id, pair.rest.id]).map((id, at) => [id, at]));
   const placeOf = (row: Row) => place.get(row.volume.id) ?? place.size;
   return (
-    <StudyCard studyKey={key} scans={scans} compared={[...compared.values()].sort(newest)}>
+    <StudyCard name={key} scans={scans} pairing={pairing} compared={[...compared.values()].sort(newest)}>
       {rows
         .toSorted((a, b) => placeOf(a) - placeOf(b))
         .map(row => (
@@ -453,7 +451,7 @@ function ScanRow({
   const [state, setState] = useState("");
   const name = nameOf(volume);
   const labels = Object.entries(volume.labels).filter(([label]) => label !== "name");
-  const made = [...acquisition(volume), toldOf(volume)].filter(Boolean).join(" · ");
+  const described = [...acquisition(volume), toldOf(volume)].filter(Boolean).join(" · ");
   useEffect(() => loadResultsOf(volume.id), [volume.id]);
   const start = (kind: Kind) => () => {
     setProblem("");
@@ -472,7 +470,7 @@ function ScanRow({
           {role && <span class={`role ${role}`}>{role}</span>}
         </span>
         {alone && study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
-        {made && <span>{made}</span>}
+        {described && <span>{described}</span>}
         <span class="quiet">
           {moment(volume.created_at)} · {bytes(volume.bytes)} · {volume.format} · {shape(volume)}
           {isLabelMap(volume) && " · label map"}

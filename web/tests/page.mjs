@@ -564,7 +564,7 @@ async function main() {
       }
       await look(page, `reader-cursor-${name}`);
       await page.goto(`${own.address}/#/`);
-      const line = page.locator(".scan .what span[title]").first();
+      const line = page.locator(".study-head h2");
       assert.match(await line.textContent(), /patient ID 1\.2\.840\.113619\.2[.\d]*…/);
       assert.ok((await line.getAttribute("title")).includes(id));
       await look(page, `reader-list-${name}`);
