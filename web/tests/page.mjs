@@ -656,6 +656,59 @@ async function main() {
     }
   });
 
+  await check("what is rarely seen or folded has no fault either", async () => {
+    const own = await service();
+    for (const [width, dark] of [
+      [1280, false],
+      [390, true],
+    ]) {
+      const { page, faults, close } = await tab(browser, own.address, { width, dark, expected: [/status of 404/] });
+      await page.waitForSelector(".drop");
+      await page.getByLabel("then").selectOption("nothing");
+      await choose(page, SCAN, TRUTH);
+      await page.waitForFunction(() => document.querySelectorAll(".uploads .stored").length === 2);
+      const unfold = async name => {
+        await page.evaluate(() => document.querySelectorAll("details").forEach(one => (one.open = true)));
+        await look(page, `${name}-${width}`);
+      };
+      await page.goto(`${own.address}/#/glossary`);
+      await page.waitForSelector(".glossary dt");
+      await unfold("glossary");
+      await page.goto(`${own.address}/#/evaluation`);
+      await page.waitForSelector(".evaluation h1");
+      await unfold("evaluation-empty");
+      await page.goto(`${own.address}/#/scan/vol_${"0".repeat(32)}`);
+      await page.waitForSelector("main [role=alert]");
+      await unfold("no-scan");
+      await page.goto(`${own.address}/#/comparison/cmp_${"0".repeat(32)}`);
+      await page.waitForSelector("main [role=alert]");
+      await unfold("no-comparison");
+      const { volumes } = await (await fetch(`${own.address}/v1/volumes`)).json();
+      await page.goto(`${own.address}/#/scan/${volumes.find(volume => !volume.label_values).id}`);
+      await page.waitForSelector(".slice canvas");
+      await look(page, `no-result-${width}`);
+      await page.getByRole("button", { name: "New fit or model" }).click();
+      for (const kind of ["Fit the ventricle", "Surface model"]) {
+        await page.getByRole("button", { name: kind }).click();
+        await page.waitForSelector(kind === "Surface model" ? "#parameter-points" : "#parameter-model");
+        await unfold(`all-parameters-${kind}`);
+      }
+      await page.getByRole("button", { name: "Fit the ventricle" }).click();
+      await page.getByRole("button", { name: "Fit", exact: true }).click();
+      await drawn(page);
+      await page.getByRole("button", { name: "New fit or model" }).click();
+      await unfold("fit-open");
+      await page.goto(`${own.address}/docs`);
+      await page.waitForSelector(".operation");
+      await page.fill("input[type=search]", "list volumes");
+      await page.waitForFunction(() => document.querySelectorAll(".operation").length < 8);
+      await unfold("docs-open");
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
+  });
+
   await check("names of files are shown by the tab that sent them, and stored if a person asks for it", async () => {
     const own = await service();
     const { page, faults, close } = await tab(browser, own.address);

@@ -102,6 +102,7 @@ function Working({ id }: { id: string }) {
   if (problem)
     return (
       <div class="pad">
+        <h1 class="hidden">Rest and stress</h1>
         <p class="error" role="alert">
           {problem}
         </p>
@@ -171,6 +172,7 @@ function Shown({ id }: { id: string }) {
   if (problem)
     return (
       <div class="pad">
+        <h1 class="hidden">Rest and stress</h1>
         <p class="error" role="alert">
           {problem}
         </p>

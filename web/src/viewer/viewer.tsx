@@ -70,6 +70,7 @@ export function Viewer({ volume: id }: { volume: string }) {
   if (problem) {
     return (
       <div class="pad">
+        <h1 class="hidden">Scan</h1>
         <p class="error" role="alert">
           {problem}
         </p>
