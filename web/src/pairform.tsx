@@ -6,9 +6,10 @@ import { correctedFits, correctionsOf } from "./corrections";
 import { beats, fits, loadResultsOf, volumes } from "./library";
 import { areOfTwoPatients, picked, statedRole, stressOf } from "./pairing";
 import { type Draft, ParameterForm, parameterSpecs, valuesOf } from "./parameters";
+import { resultName, timeOf } from "./resultnames";
 import { openComparison } from "./route";
 import { useWatched } from "./state";
-import { acquisition, cut, moment, nameOf, resultName, study, timeOf } from "./words";
+import { acquisition, cut, moment, nameOf, study } from "./words";
 import { fileComparison } from "./work";
 
 const TOLD = {

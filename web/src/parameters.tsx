@@ -3,8 +3,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { type Kind, type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
 import { fits, models, normals, templates, volumes } from "./library";
+import { resultName, timeOf } from "./resultnames";
 import { useWatched } from "./state";
-import { cut, isLabelMap, nameOf, resultName, timeOf } from "./words";
+import { cut, isLabelMap, nameOf } from "./words";
 
 interface Schema {
   type?: string | string[];

@@ -2,7 +2,8 @@
 
 import type { Result } from "./api";
 import { newerCorrections } from "./corrections";
-import { isBeat, isComparison, isFit, nameAmong, number, resultName } from "./words";
+import { nameAmong, resultName } from "./resultnames";
+import { isBeat, isComparison, isFit, number } from "./words";
 
 export function ComparisonLink({ made }: { made: Result }) {
   return (

@@ -1,6 +1,6 @@
 // How things are called and numbers are written.
 
-import type { Job, Kind, Result, Volume } from "./api";
+import type { Job, Kind, Volume } from "./api";
 
 /**
  * Names of the files that this tab has sent, by the ids of their volumes. They are often patients' names, and are
@@ -96,6 +96,11 @@ export function moment(text: string): string {
   return MINUTE.format(new Date(text));
 }
 
+/** As `moment`, to the second. */
+export function exactMoment(text: string): string {
+  return SECOND.format(new Date(text));
+}
+
 export function number(value: unknown, digits = 1, unit = ""): string {
   if (typeof value !== "number" || !Number.isFinite(value)) return "–";
   // Not the sign of a zero.
@@ -162,37 +167,6 @@ export function isComparison(id: string): boolean {
 /** The kind of work that makes such a result. */
 export function kindOf(id: string): Kind {
   return isFit(id) ? "segmentation" : isBeat(id) ? "beat" : isComparison(id) ? "comparison" : "model";
-}
-
-/** What distinguishes a result from others of the same scan. */
-export function resultName(result: Result): string {
-  if (isFit(result.id) || isBeat(result.id)) {
-    const changed = ["center", "axis", "base", "roll", "segments_from"].filter(
-      name => result.parameters[name] != null && result.parameters[name] !== 0,
-    );
-    const model = result.parameters["model"];
-    const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
-    const what = isBeat(result.id) ? `beat of ${result.summary.gates} gates` : "fit";
-    return `${changed.length ? "Corrected " : ""}${what}${by}`.replace(/^./, letter => letter.toUpperCase());
-  }
-  if (isComparison(result.id)) return "Rest and stress";
-  return `Model, ${String(result.summary["vertices"])} points`;
-}
-
-const namesakes = (result: Result, among: Result[]) =>
-  among.filter(other => other.id !== result.id && resultName(other) === resultName(result));
-
-/** When a result was made: to the second if another of its name was made in the same minute. */
-export function timeOf(result: Result, among: Result[]): string {
-  const minute = moment(result.created_at);
-  const same = namesakes(result, among).some(other => moment(other.created_at) === minute);
-  return same ? SECOND.format(new Date(result.created_at)) : minute;
-}
-
-/** The name of a result among others of its scan: with its time if another has the same name. */
-export function nameAmong(result: Result, among: Result[]): string {
-  const name = resultName(result);
-  return namesakes(result, among).length > 0 ? `${name} of ${timeOf(result, among)}` : name;
 }
 
 export function ordinal(n: number): string {

@@ -818,11 +818,15 @@ async function main() {
       return (await fetch(own.address + path, body)).json();
     };
     const volume = (await ask("/v1/volumes")).volumes[0].id;
-    for (const parameters of [{}, { margin: 1 }, { margin: 2 }, { margin: 3, roll: 5 }]) {
-      let job = await ask("/v1/jobs", { kind: "segmentation", volume, parameters });
+    const make = async (kind, parameters) => {
+      let job = await ask("/v1/jobs", { kind, volume, parameters });
       while (!/succeeded|failed|cancelled/.test(job.state)) job = await ask(job.links.self);
       assert.equal(job.state, "succeeded", JSON.stringify(job.error));
-    }
+      return job;
+    };
+    const { model } = await make("model", { points: 120 });
+    for (const parameters of [{}, { margin: 1 }, { model }, { margin: 3, roll: 5 }])
+      await make("segmentation", parameters);
     await page.reload();
     const apart = async (where, count) => {
       await page.waitForFunction(([where, count]) => document.querySelectorAll(where).length === count, [where, count]);
@@ -831,16 +835,16 @@ async function main() {
       return names;
     };
     const names = await apart(".scan .result b", 4);
-    assert.equal(names.filter(name => /^Fit of .*\d/.test(name)).length, 3, names.join("; "));
-    assert.equal(names.filter(name => name === "Corrected fit").length, 1, names.join("; "));
+    assert.equal(names.filter(name => /^Fit of .*\d:\d\d/.test(name)).length, 2, names.join("; "));
+    assert.ok(names.includes("Fit of a model of 120 points") && names.includes("Corrected fit"), names.join("; "));
     await look(page, "fits-1280");
     await page.goto(`${own.address}/#/scan/${volume}`);
     await drawn(page);
-    await apart(".choices .pick", 4);
+    await apart(".choices .pick", 5);
     const labels = await page
       .locator(".choices button[aria-label^=Compare]")
       .evaluateAll(all => all.map(one => one.getAttribute("aria-label")));
-    assert.equal(new Set(labels).size, 3, labels.join("; "));
+    assert.equal(new Set(labels).size, 4, labels.join("; "));
     await page.getByRole("button", { name: "New fit or model" }).click();
     await page.waitForSelector("#parameter-model");
     await apart("#parameter-model optgroup[label='Fits of this scan'] option", 4);

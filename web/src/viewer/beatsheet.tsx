@@ -1,6 +1,7 @@
 // What the viewer prints of a beat: one page.
 
-import { moment, number, resultName, shape } from "../words";
+import { resultName } from "../resultnames";
+import { moment, number, shape } from "../words";
 import { mapsOf } from "./beatview";
 import { PhaseHistogram, VolumeCurve } from "./charts";
 import { drawSlice } from "./drawing";

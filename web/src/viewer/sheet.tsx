@@ -1,7 +1,8 @@
 // What the viewer prints: two pages of paper, of a beat one, the figures that matter first.
 
 import type { ComponentChildren } from "preact";
-import { counts, isFit, moment, number, resultName, shape } from "../words";
+import { resultName } from "../resultnames";
+import { counts, isFit, moment, number, shape } from "../words";
 import { BeatSheet } from "./beatsheet";
 import type { Camera } from "./camera";
 import { DIVERGING, LUTS, UPTAKE } from "./colours";

@@ -21,23 +21,11 @@ import {
 } from "../library";
 import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
+import { nameAmong, resultName, timeOf } from "../resultnames";
 import { home, isAt, open, openComparison, route } from "../route";
 import { useWatched } from "../state";
 import { file, isFiledHere } from "../work";
-import {
-  isBeat,
-  isFit,
-  isGated,
-  kindOf,
-  moment,
-  nameAmong,
-  nameOf,
-  resultName,
-  shape,
-  study,
-  timeOf,
-  titleOf,
-} from "../words";
+import { isBeat, isFit, isGated, kindOf, moment, nameOf, shape, study, titleOf } from "../words";
 import { BeatCharts, BeatMaps, PerfusionView } from "./beatview";
 import { LUT, UPTAKE, WALL_LUT, kept } from "./colours";
 import { Correction } from "./correction";
