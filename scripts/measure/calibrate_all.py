@@ -14,6 +14,7 @@ stand below. Out: the tables in scripts/measure/calibration, and by them
 - heart/deform/thickness_calibration.rs (calibrate_thickness.py)
 - heart/beat/calibration.rs and heart/judge/volume_calibration.rs (calibrate_intervals.py)
 - heart/comparison/calibration.rs (calibrate_comparison.py)
+- heart/serial/calibration.rs (calibrate_serial.py)
 
 of crates/ventriform/src. The same commit gives the same bytes on every machine of one kind. The fits are by the
 constants as they stand: run it again until nothing changes, and judge the fits anew (docs/evaluation.md) before
@@ -37,6 +38,7 @@ PROGRAMS = [
     "volumes",
     "beats",
     "comparisons",
+    "serials",
 ]
 ALL = "in,motion,rv,basal,apex,infarct,large,small,noise,gut,liver,coarse,turned,none"
 # Kinds with a heart in its place, for the ends of the signal.
@@ -72,6 +74,8 @@ OF_VOLUMES = ["6003", "6007", "6009"]
 # Seeds and numbers of gated studies, and of pairs without gates.
 BEATS = {"500": (500, 20), "501": (501, 20)}
 PAIRS = {"610": (610, 20)}
+# Of gated series.
+SERIES = {"41": (41, 40)}
 # Seed and number of hearts with walls of every thickness, and of gated ones.
 OF_THICKNESS = {"6001": (6001, 120)}
 BEATS_OF_THICKNESS = {"7103": (7103, 16)}
@@ -156,7 +160,13 @@ def comparisons(lab):
     script("calibrate_comparison.py", "--write")
 
 
-PARTS = {part.__name__: part for part in (features, walls, volumes, beats, comparisons)}
+def serials(lab):
+    table = TABLES / "serials.csv"
+    lab.run("serials", *lab.studies("serial", SERIES, "--gates", 8), into=table)
+    script("calibrate_serial.py", "--write")
+
+
+PARTS = {part.__name__: part for part in (features, walls, volumes, beats, comparisons, serials)}
 
 
 def script(name, *arguments):

@@ -16,7 +16,7 @@ use ventriform_evaluation::simulator::healthy::{self, OneDefect, Protocol};
 use ventriform_evaluation::simulator::kinds::{self, Kind, Sampling};
 use ventriform_evaluation::simulator::random::{Draws, Stream};
 use ventriform_evaluation::simulator::study::StudyOptions;
-use ventriform_evaluation::simulator::{case, pairs, study, variants, walls};
+use ventriform_evaluation::simulator::{case, pairs, serial, study, variants, walls};
 
 /// Seeds of the cases of one order: more than cases that anyone asks for.
 const CASES_OF_A_SEED: u64 = 100_000;
@@ -70,6 +70,20 @@ enum What {
         order: Order,
         /// Kinds, taken in turn
         #[arg(long, value_delimiter = ',', default_values_t = owned(&pairs::KINDS))]
+        kinds: Vec<String>,
+        /// Gates; 0: none
+        #[arg(long, default_value_t = 8)]
+        gates: usize,
+        /// Voxels along an axis, 64 or 128
+        #[arg(long, default_value_t = 64)]
+        matrix: usize,
+    },
+    /// One heart twice, years apart
+    Serial {
+        #[command(flatten)]
+        order: Order,
+        /// Kinds, taken in turn
+        #[arg(long, value_delimiter = ',', default_values_t = owned(&serial::KINDS))]
         kinds: Vec<String>,
         /// Gates; 0: none
         #[arg(long, default_value_t = 8)]
@@ -160,7 +174,7 @@ struct Case<'a> {
 impl Case<'_> {
     fn unless_there(&self, make: impl FnOnce() -> Result<()>) -> Result<()> {
         let done = |name: &str| self.folder.join(name).exists();
-        if done("params.json") || done("pair.json") {
+        if done("params.json") || done("pair.json") || done("serial.json") {
             return Ok(());
         }
         make().with_context(|| self.name.to_owned())?;
@@ -227,6 +241,19 @@ fn main() -> Result<()> {
             order.make(name, &|one: &Case| {
                 let kind = kind(one.number);
                 pairs::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
+            })
+        }
+        What::Serial {
+            order,
+            kinds,
+            gates,
+            matrix,
+        } => {
+            let kind = |number: usize| &kinds[number % kinds.len()];
+            let name = |number: usize| format!("{}_{}_{number:03}", kind(number), order.seed);
+            order.make(name, &|one: &Case| {
+                let kind = kind(one.number);
+                serial::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
             })
         }
         What::Gated {

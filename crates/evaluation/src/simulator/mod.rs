@@ -40,6 +40,7 @@ pub mod random;
 pub mod reader;
 pub mod reconstruct;
 pub mod scan;
+pub mod serial;
 pub mod study;
 pub mod truth;
 pub mod variants;

@@ -25,6 +25,8 @@ pub const KINDS: [&str; 10] = [
 
 /// Height of the slices that are kept, mm.
 const HEIGHT_MM: f64 = 224.0;
+/// Deviations of the place and of the direction of a patient who lies down again, mm and degrees.
+const MOVED_SD: [f64; 2] = [3.0, 2.5];
 /// Most uptake of liver and gut.
 const MAX_ORGAN: f64 = 1.2;
 
@@ -121,7 +123,7 @@ pub fn write(
         scan.heart.defects = difference.fixed.iter().cloned().collect();
     }
     let [stress, rest] = &mut scans;
-    let moved = lie_down_again(stress, d);
+    let moved = lie_down_again(stress, MOVED_SD, d);
     stress.role = Some("stress".into());
     rest.role = Some("rest".into());
     if difference.reduction > 0.0 {
@@ -161,10 +163,15 @@ pub fn write(
     Ok(truth)
 }
 
-/// The patient lies elsewhere, with other counts in liver and gut. Out: how far, mm and degrees.
-fn lie_down_again(p: &mut Parameters, d: &mut Draws) -> Value {
-    let mm = [0, 1, 2].map(|_| d.normal(0.0, 3.0));
-    let degrees = [0, 1, 2].map(|_| d.normal(0.0, 2.5));
+/// The patient lies elsewhere, by these deviations of place and direction, with other counts in liver and gut. Out: how
+/// far, mm and degrees.
+pub(super) fn lie_down_again(
+    p: &mut Parameters,
+    [mm_sd, degrees_sd]: [f64; 2],
+    d: &mut Draws,
+) -> Value {
+    let mm = [0, 1, 2].map(|_| d.normal(0.0, mm_sd));
+    let degrees = [0, 1, 2].map(|_| d.normal(0.0, degrees_sd));
     p.lv_centre_body_mm
         .iter_mut()
         .zip(mm)
@@ -187,7 +194,7 @@ fn lie_down_again(p: &mut Parameters, d: &mut Draws) -> Value {
 }
 
 /// Makes the cavity larger by a factor; a thinner wall keeps the muscle.
-fn dilate(heart: &mut Heart, factor: f64) {
+pub(super) fn dilate(heart: &mut Heart, factor: f64) {
     let muscle = |heart: &Heart| {
         let plain = Heart {
             defects: Vec::new(),
