@@ -87,6 +87,18 @@ impl DicomArgs {
         self.ordered(|choice| choice.order_of_gates(files, limits, &Monitor::silent()))
     }
 
+    /// As [`DicomArgs::order`], of a scan that may be gated.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn order_of_either(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<ObjectOrder>> {
+        self.ordered(|choice| choice.order_of_either(files, limits, &Monitor::silent()))
+    }
+
     /// As [`DicomArgs::order`], of two scans of one patient, gated or not.
     ///
     /// # Errors

@@ -29,6 +29,7 @@ mod phantom;
 mod reconstruct;
 mod resolution;
 mod segment;
+mod serial;
 mod serve;
 mod statistics;
 mod templates;
@@ -67,6 +68,7 @@ enum Command {
     Segment(Box<segment::SegmentArgs>),
     Beat(Box<beat::BeatArgs>),
     Compare(Box<compare::CompareArgs>),
+    Serial(Box<serial::SerialArgs>),
     Inspect(inspect::InspectArgs),
     Reconstruct(reconstruct::ReconstructArgs),
     Measure(measure::MeasureArgs),
@@ -121,6 +123,7 @@ pub fn main() -> ExitCode {
         Command::Segment(args) => segment::run(&args),
         Command::Beat(args) => beat::run(&args),
         Command::Compare(args) => compare::run(&args),
+        Command::Serial(args) => serial::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Reconstruct(args) => reconstruct::run(&args),
         Command::Measure(args) => measure::run(&args),

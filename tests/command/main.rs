@@ -13,3 +13,4 @@ mod evaluate;
 #[path = "../api/gated.rs"]
 mod gated;
 mod segment;
+mod serial;

@@ -102,6 +102,18 @@ impl Plan {
 }
 
 impl Plan {
+    /// A serial comparison: every scan by itself, and again from the common heart.
+    pub const SERIAL: Plan = Plan(&[
+        (Stage::Read, 0.05),
+        (Stage::Localise, 0.3),
+        (Stage::Align, 0.1),
+        (Stage::Deform, 0.2),
+        (Stage::Beat, 0.2),
+        (Stage::Polar, 0.05),
+        (Stage::Report, 0.05),
+        (Stage::Export, 0.05),
+    ]);
+
     /// A beat: the gates' sum segmented and measured, and one wall fitted to all gates.
     pub const BEAT: Plan = Plan(&[
         (Stage::Read, 0.05),

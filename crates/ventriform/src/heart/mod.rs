@@ -1,6 +1,6 @@
 //! The left ventricle of a patient: a model fitted to the volume ([`model`], [`deform`], [`judge`], [`fit`]), the wall's
 //! uptake ([`polar`]) and motion ([`beat`], during the scan [`views`]), compared with healthy people ([`normals`]), between rest and stress
-//! ([`comparison`]), and drawn as a reader draws it ([`reader`]).
+//! ([`comparison`]) and over the years ([`serial`]), and drawn as a reader draws it ([`reader`]).
 
 pub mod model;
 
@@ -19,5 +19,7 @@ pub mod beat;
 pub mod normals;
 
 pub mod comparison;
+
+pub mod serial;
 
 pub mod reader;

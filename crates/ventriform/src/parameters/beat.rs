@@ -3,37 +3,23 @@
 use super::with_fit::{BesideFit, WithFit};
 use super::{Kind, ParameterError, ParameterSpec, Parameters, groups};
 use serde_json::json;
-use std::ops::RangeInclusive;
 
 pub use crate::image::volume::RR_MS;
-
-/// Masses that a left ventricle's muscle can have, g.
-pub const MASS_G: RangeInclusive<f64> = 20.0..=600.0;
 
 /// The parameters of a beat beside those of the fit to the gates' sum.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BeatChoice {
     /// Whether the volumes are gates although the file does not say so. Default `false`.
     pub gated: bool,
-    /// Mass of the left ventricle's muscle, g, where it is known; within [`MASS_G`]. Default: the wall's usual
-    /// thickness is assumed.
-    pub mass_g: Option<f64>,
     /// The R-R interval, ms, within [`RR_MS`]. Default: as the file states it.
     pub rr_ms: Option<f64>,
 }
 
 impl BeatChoice {
-    /// The first parameter that lies outside of its range: name, value, least and greatest.
+    /// The parameter that lies outside of its range: name, value, least and greatest.
     pub fn out_of_range(&self) -> Option<(&'static str, f64, [f64; 2])> {
-        [
-            ("mass_g", self.mass_g, MASS_G),
-            ("rr_ms", self.rr_ms, RR_MS),
-        ]
-        .into_iter()
-        .find_map(|(name, value, range)| {
-            let value = value?;
-            (!range.contains(&value)).then_some((name, value, [*range.start(), *range.end()]))
-        })
+        let value = self.rr_ms.filter(|rr_ms| !RR_MS.contains(rr_ms))?;
+        Some(("rr_ms", value, [*RR_MS.start(), *RR_MS.end()]))
     }
 }
 
@@ -62,24 +48,6 @@ pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
             Ok(())
         },
         write: |p| json!(p.gated),
-    },
-    ParameterSpec {
-        name: "mass_g",
-        title: "Mass of the muscle",
-        group: groups::MAIN,
-        unit: "g",
-        kind: Kind::Number {
-            min: *MASS_G.start(),
-            max: *MASS_G.end(),
-        },
-        default: "",
-        summary: "Mass of the left ventricle's muscle, g, where it is known: the image does not tell how thick the \
-                  wall is. Default: the usual thickness is assumed",
-        read: |d, v| {
-            d.mass_g = Some(v.f64());
-            Ok(())
-        },
-        write: |p| json!(p.mass_g),
     },
     ParameterSpec {
         name: "rr_ms",
@@ -133,10 +101,7 @@ mod tests {
 
     #[test]
     fn written_parameters_read_back_unchanged() {
-        checks::read_back_unchanged::<BeatChoice>(&[
-            &[],
-            &[("gated", "true"), ("mass_g", "130.5"), ("rr_ms", "850")],
-        ]);
+        checks::read_back_unchanged::<BeatChoice>(&[&[], &[("gated", "true"), ("rr_ms", "850")]]);
         let both = pairs(&[("mass_g", "130"), ("axis", "0,0,-1"), ("template", "auto")]).unwrap();
         assert_eq!(GatedParameters::from_json(&both.to_json()).unwrap(), both);
     }

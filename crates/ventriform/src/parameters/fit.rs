@@ -4,7 +4,7 @@ use super::ParameterError;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::bvh::Aabb;
 use crate::heart::deform::{DeformParameters, Orbit};
-use crate::heart::model::Organ;
+use crate::heart::model::{MYOCARDIAL_DENSITY_G_PER_ML, Organ};
 use crate::heart::normals::ScanKind;
 use crate::heart::polar::PolarParameters;
 use crate::image::locate::Hints;
@@ -12,6 +12,10 @@ use crate::image::locate::patient_orientation::Superior;
 use crate::image::reconstruct::Reconstruction;
 use crate::image::volume::given_mask::MaskChoice;
 use crate::image::volume::{AffineSource, Provenance, Volume};
+use std::ops::RangeInclusive;
+
+/// Masses that a left ventricle's muscle can have, g.
+pub const MASS_G: RangeInclusive<f64> = 20.0..=600.0;
 
 /// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +44,10 @@ pub struct FitParameters {
     pub organ: Organ,
     /// Known position of the organ.
     pub position: KnownPosition,
-    /// Parameters of the deformation. [`FitParameters::on`] sets its hints.
+    /// Mass of the left ventricle's muscle, g, where it is known; within [`MASS_G`]. `None`: by the wall's width, as far
+    /// as that tells its thickness.
+    pub mass_g: Option<f64>,
+    /// Parameters of the deformation. [`FitParameters::on`] sets its hints and the volume of the muscle.
     pub deform: DeformParameters,
     /// Parameters of the polar map.
     pub polar: PolarParameters,
@@ -77,6 +84,7 @@ impl Default for FitParameters {
             scan: ScanKind::default(),
             organ: Organ::LeftVentricle,
             position: KnownPosition::default(),
+            mass_g: None,
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
             mask_grid: MaskGrid::default(),
@@ -142,7 +150,7 @@ impl FitParameters {
     /// millimetres. If nothing says how they lie, and neither do the parameters, no side of the heart is known.
     ///
     /// # Errors
-    /// A [`ParameterError`] for a hint outside the volume.
+    /// A [`ParameterError`] for a hint outside the volume, and a mass that no heart has.
     pub fn on(
         &self,
         volume: &Volume,
@@ -151,7 +159,18 @@ impl FitParameters {
     ) -> Result<DeformParameters, ParameterError> {
         let deform = self.deform.clone();
         let untold = !source.states_orientation() && deform.superior == Superior::Body;
+        if let Some(mass_g) = self.mass_g.filter(|mass_g| !MASS_G.contains(mass_g)) {
+            let [least, most] = [MASS_G.start(), MASS_G.end()];
+            return Err(ParameterError {
+                field: "mass_g".into(),
+                message: format!("{mass_g} is no mass of a left ventricle"),
+                fix: format!("Give `mass_g` a number from {least} to {most}, in grams."),
+            });
+        }
         Ok(DeformParameters {
+            muscle_ml: self
+                .mass_g
+                .map(|mass_g| mass_g / MYOCARDIAL_DENSITY_G_PER_ML),
             hints: self.position.hints(volume)?,
             orbit: (deform.orbit)
                 .or_stated(scan.and_then(|scan| Orbit::of_arc(scan.scan_arc_deg()?))),

@@ -2,7 +2,9 @@
 
 use super::reconstruction::reconstruction_rows;
 use super::table::{choice, integer, joined, number, optional, titled};
-use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters, groups};
+use super::{
+    FitParameters, Kind, MASS_G, MaskGrid, ParameterError, ParameterSpec, Parameters, groups,
+};
 use crate::base::geometry::Vec3;
 use crate::heart::deform::sensors::SensorKind;
 use crate::heart::deform::{Orbit, WallEdge};
@@ -545,6 +547,24 @@ const OF_FIT: &[ParameterSpec<FitParameters>] = &[
             "anatomical" => WallEdge::Anatomical,
         ),
     ),
+    ParameterSpec {
+        name: "mass_g",
+        title: "Mass of the muscle",
+        group: groups::MAIN,
+        unit: "g",
+        kind: Kind::Number {
+            min: *MASS_G.start(),
+            max: *MASS_G.end(),
+        },
+        default: "",
+        summary: "Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly \
+                  tells how thick a wall is. Default: by the wall's width, with the interval that it leaves",
+        read: |d, v| {
+            d.mass_g = Some(v.f64());
+            Ok(())
+        },
+        write: |p| json!(p.mass_g),
+    },
     titled(
         "Grid of the masks",
         choice!(

@@ -153,10 +153,14 @@ impl RawValue<'_> {
                 more,
             } => match self.as_text() {
                 Some(text) if is_id(text, prefixes) => Ok(Checked::Text(text.into())),
-                Some(text) if !word.is_empty() => {
-                    let mut parts = text.split(',');
-                    let begins = parts.next() == Some(word);
-                    let ids: Vec<&str> = parts.collect();
+                Some(text) if more > 0 || !word.is_empty() => {
+                    let mut ids: Vec<&str> = text.split(',').collect();
+                    // Where no word is known, the first id stands in its place.
+                    let begins = match word {
+                        "" => is_id(ids[0], prefixes),
+                        word => ids.remove(0) == word,
+                    };
+                    let more = more + usize::from(word.is_empty());
                     let known = ids.iter().all(|id| is_id(id, prefixes));
                     let twice = (1..ids.len()).any(|n| ids[..n].contains(&ids[n]));
                     match begins && known {

@@ -46,7 +46,7 @@ pub enum Kind {
         prefixes: &'static [&'static str],
         /// A word that is accepted instead of an id; empty if there is none.
         word: &'static str,
-        /// Most ids that may follow the word, separated by commas.
+        /// Most ids that may follow the word, separated by commas; without a word, the first id.
         more: usize,
     },
 }

@@ -1,8 +1,8 @@
-//! The parameters of a model, of a fit, of a beat, of a comparison, of normal limits and of a reconstruction, by the
-//! names that users give them.
+//! The parameters of a model, of a fit, of a beat, of comparisons, of normal limits and of a reconstruction, by the names
+//! that users give them.
 //!
-//! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`], [`NORMALS_SPECS`] and
-//! [`RECONSTRUCTION_SPECS`], define names, types, ranges, defaults and help texts for the command line, query strings,
+//! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`], [`SERIAL_SPECS`],
+//! [`NORMALS_SPECS`] and [`RECONSTRUCTION_SPECS`], define names, types, ranges, defaults and help texts for the command line, query strings,
 //! the JSON of jobs and the OpenAPI document. Text or JSON goes in; [`ModelParameters`], [`FitParameters`] or
 //! [`WithFit`] come out, with every value of the right type and in its range, or a [`ParameterError`] with the name of
 //! the first invalid parameter.
@@ -23,14 +23,15 @@ mod reconstruction;
 mod resolution;
 #[cfg(feature = "schema")]
 mod schema;
+mod serial;
 mod specs;
 mod table;
 mod with_fit;
 
-pub use beat::{BEAT_SPECS, BeatChoice, GatedParameters, MASS_G, RR_MS};
+pub use beat::{BEAT_SPECS, BeatChoice, GatedParameters, RR_MS};
 pub use calibration::{CalibrationChoice, CalibrationParameters};
 pub use comparison::{COMPARISON_SPECS, ComparisonChoice, ComparisonParameters};
-pub use fit::{FitParameters, KnownPosition, MaskGrid};
+pub use fit::{FitParameters, KnownPosition, MASS_G, MaskGrid};
 pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
 pub use kind::Kind;
@@ -40,6 +41,7 @@ pub use reconstruction::RECONSTRUCTION_SPECS;
 pub use resolution::{ResolutionChoice, ResolutionParameters};
 #[cfg(feature = "schema")]
 pub use schema::schema_of;
+pub use serial::{SERIAL_SPECS, SerialChoice, SerialParameters};
 pub use specs::MODEL_SPECS;
 pub use table::{ParameterSpec, Parameters};
 pub use with_fit::{BesideFit, WithFit};

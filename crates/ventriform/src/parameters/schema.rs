@@ -2,7 +2,8 @@
 
 use super::{
     BeatChoice, BesideFit, ComparisonChoice, ComparisonParameters, FitParameters, GatedParameters,
-    Kind, ModelParameters, NormalsChoice, NormalsParameters, ParameterSpec, Parameters, WithFit,
+    Kind, ModelParameters, NormalsChoice, NormalsParameters, ParameterSpec, Parameters,
+    SerialChoice, SerialParameters, WithFit,
 };
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -58,6 +59,18 @@ impl ToSchema for ComparisonParameters {
 impl PartialSchema for ComparisonParameters {
     fn schema() -> RefOr<Schema> {
         with_fit::<ComparisonChoice>()
+    }
+}
+
+impl ToSchema for SerialParameters {
+    fn name() -> Cow<'static, str> {
+        "SerialParameters".into()
+    }
+}
+
+impl PartialSchema for SerialParameters {
+    fn schema() -> RefOr<Schema> {
+        with_fit::<SerialChoice>()
     }
 }
 
@@ -147,7 +160,8 @@ pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
         } => {
             let id = format!("({})[0-9a-f]{{1,64}}", prefixes.join("|"));
             let pattern = match (word, more) {
-                ("", _) => format!("^{id}$"),
+                ("", 0) => format!("^{id}$"),
+                ("", _) => format!("^{id}(,{id}){{0,{more}}}$"),
                 (_, 0) => format!("^({word}|{id})$"),
                 _ => format!("^({word}(,{id}){{0,{more}}}|{id})$"),
             };

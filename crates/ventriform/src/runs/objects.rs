@@ -93,7 +93,22 @@ impl ObjectChoice {
         of_gates(files, |files| self.order(files, Some(0), limits, monitor))
     }
 
-    /// As [`ObjectChoice::order`], of each of two scans of one patient, gated or not.
+    /// As [`ObjectChoice::order`], of a scan that may be gated.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn order_of_either(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+        monitor: &Monitor<'_>,
+    ) -> Result<ObjectOrder, ObjectError> {
+        let gates = || self.order_of_gates(files, limits, monitor);
+        let one = self.order(files, None, limits, monitor);
+        one.or_else(|error| gates().map_err(|_| error))
+    }
+
+    /// The same of each of two scans of one patient.
     ///
     /// # Errors
     /// As there.
@@ -103,12 +118,7 @@ impl ObjectChoice {
         limits: &ReadLimits,
         monitor: &Monitor<'_>,
     ) -> Result<[ObjectOrder; 2], ObjectError> {
-        let of = |files: &[VolumeFile]| {
-            let gates = || self.order_of_gates(files, limits, monitor);
-            let one = self.order(files, None, limits, monitor);
-            one.or_else(|error| gates().map_err(|_| error))
-        };
-        let [first, second] = scans.map(of);
+        let [first, second] = scans.map(|files| self.order_of_either(files, limits, monitor));
         Ok([first?, second?])
     }
 }

@@ -138,6 +138,23 @@ fn gates() -> &'static [Volume] {
 
 /// The beat of gates in separate files.
 fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedError> {
+    beat_by(gates, choice, &FitParameters::default())
+}
+
+/// The beat of a heart whose muscle weighs so much, g.
+fn beat_of_mass(gates: &[Volume], mass_g: f64) -> Result<GatedHeart, GatedError> {
+    let parameters = FitParameters {
+        mass_g: Some(mass_g),
+        ..FitParameters::default()
+    };
+    beat_by(gates, BeatChoice::default(), &parameters)
+}
+
+fn beat_by(
+    gates: &[Volume],
+    choice: BeatChoice,
+    parameters: &FitParameters,
+) -> Result<GatedHeart, GatedError> {
     let file = |(index, gate): (usize, &Volume)| {
         let bytes = nifti::write(gate, StoredType::Float32, false).expect("floats fit");
         VolumeFile::in_memory(format!("gate{index}.nii"), bytes)
@@ -148,7 +165,7 @@ fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedErro
         auto: true,
         models: Vec::new(),
         normals: None,
-        parameters: &FitParameters::default(),
+        parameters,
         choice,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
@@ -464,11 +481,7 @@ fn too_many_counts_are_told_of_the_gate_that_has_them() {
 fn a_mass_that_the_wall_cannot_have_is_told() {
     let usual_g = whole().report().mass_g;
     for (mass_g, told) in [(400.0, true), (usual_g, false)] {
-        let choice = BeatChoice {
-            mass_g: Some(mass_g),
-            ..BeatChoice::default()
-        };
-        let heart = beat_of(gates(), choice).unwrap();
+        let heart = beat_of_mass(gates(), mass_g).unwrap();
         let found = codes(&heart).contains(&"mass_not_met".to_owned());
         assert_eq!(found, told, "{mass_g}: {}", heart.report().mass_g);
     }
@@ -572,11 +585,7 @@ fn a_heart_that_leaves_the_field_is_told() {
 fn a_known_mass_is_met() {
     let [inner, outer] = [0.0, 9.0].map(|more| volume_ml(cavity_axes(0.0).map(|a| a + more)));
     let mass_g = 1.05 * (outer - inner);
-    let choice = BeatChoice {
-        mass_g: Some(mass_g),
-        ..BeatChoice::default()
-    };
-    let report = beat_of(gates(), choice).unwrap().report();
+    let report = beat_of_mass(gates(), mass_g).unwrap().report();
     let found = 1.05 * report.wall_ml;
     assert!((found / mass_g - 1.0).abs() < 0.05, "{found} of {mass_g}");
 }
@@ -712,12 +721,20 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
         matches!(one, GatedError::Volume(VolumeError::NotGated { .. })),
         "{one}"
     );
-    let heavy = BeatChoice {
-        mass_g: Some(1e4),
+    let heavy = beat_of_mass(gates(), 1e4).unwrap_err();
+    assert_eq!(
+        heavy.to_string(),
+        "`mass_g`: 10000 is no mass of a left ventricle"
+    );
+    let slow = BeatChoice {
+        rr_ms: Some(1e5),
         ..BeatChoice::default()
     };
-    let heavy = beat_of(gates(), heavy).unwrap_err();
-    assert_eq!(heavy.to_string(), "`mass_g` is 10000; it must be 20 to 600");
+    let slow = beat_of(gates(), slow).unwrap_err();
+    assert_eq!(
+        slow.to_string(),
+        "`rr_ms` is 100000; it must be 300 to 2500"
+    );
 }
 
 /// Shells and folders sort `gate10` before `gate2`.

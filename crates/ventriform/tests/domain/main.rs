@@ -33,6 +33,7 @@ mod hot_neighbours;
 mod orientation;
 mod pipeline;
 mod quality;
+mod serial;
 
 mod normals;
 mod reader;

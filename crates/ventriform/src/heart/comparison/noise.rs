@@ -3,7 +3,8 @@
 //! In: the difference of both maps and the same smoothed. Out: the pair's [`Noise`], and fields of noise like it
 //! ([`fields`]). The steps:
 //!
-//! 1. A loss at stress raises one side of the difference. Only the places on the other side are used.
+//! 1. A loss at stress raises one side of the difference. Only the places on the other side are used, unless there is far
+//!    more on that: then uptake rose there, and the side of the losses is used.
 //! 2. There, two figures tell the noise: the mean square of the smoothed difference, and that of what smoothing takes
 //!    away ([`SMOOTH_PER_FINE_NOISE`]), which stands on many more independent places, but knows less of slow noise.
 //! 3. The variance is the mean of both and of the usual pair's ([`USUAL_NOISE_POINTS`]), each by its degrees of freedom.
@@ -13,8 +14,8 @@
 //!
 //! Guaranteed: the same maps give the same noise and the same fields.
 //!
-//! Not guaranteed: what both scans share, such as attenuation. Where uptake is higher at stress over much of the wall,
-//! that counts as noise.
+//! Not guaranteed: what both scans share, such as attenuation. Where uptake rose in a part of the wall and fell in another,
+//! the rise counts as noise.
 
 use super::calibration::{
     MUSCLE_SD, MUSCLE_SD_PER_POINT, ROW_NOISE_SHARES, SMOOTH_PER_FINE_NOISE, USUAL_NOISE_POINTS,
@@ -33,6 +34,9 @@ const USUAL_FREEDOM: f64 = 8.0;
 const CORRELATION_PLACES: [f64; 2] = [2.1, 3.4];
 /// Rows and columns on either side that it takes in.
 const CORRELATION_REACH: [usize; 2] = [6, 10];
+/// Quotient of the variances of both sides from which on the greater one is no noise: chance exceeds it in one of thirty
+/// pairs.
+const CHANGED_SIDE: f64 = 2.5;
 /// Standard deviations by which the walls' volumes of one heart hardly differ.
 const MUSCLE_SDS: f64 = 4.0;
 /// The seed of all fields.
@@ -43,7 +47,7 @@ const FIELD_SEED: u64 = 60;
 pub struct Noise {
     /// Standard deviation over the wall, per cent of the rest map's reference.
     pub points: f64,
-    /// Root mean square of the smoothed difference where uptake is not lower at stress, points.
+    /// Root mean square of the smoothed difference on the side that is used, points.
     pub smooth_points: f64,
     /// The same of what smoothing takes away.
     pub fine_points: f64,
@@ -59,9 +63,19 @@ impl Noise {
 
     /// The noise of a pair with this difference, before and after it was smoothed, points.
     pub(super) fn of_pair(raw: &[Option<f64>], smoothed: &[Option<f64>], areas: &[f64]) -> Self {
+        let [gained, lost] = [-1.0, 1.0].map(|side| Self::of_side(side, raw, smoothed, areas));
+        if gained.points.powi(2) > CHANGED_SIDE * lost.points.powi(2) {
+            lost
+        } else {
+            gained
+        }
+    }
+
+    /// The same by the places whose difference has the sign of `side`.
+    fn of_side(side: f64, raw: &[Option<f64>], smoothed: &[Option<f64>], areas: &[f64]) -> Self {
         let (mut smooth, mut fine, mut area) = (0.0, 0.0, 0.0);
         for (index, (raw, smoothed)) in raw.iter().zip(smoothed).enumerate() {
-            let (Some(raw), Some(slow)) = (*raw, smoothed.filter(|own| *own < 0.0)) else {
+            let (Some(raw), Some(slow)) = (*raw, smoothed.filter(|own| side * *own > 0.0)) else {
                 continue;
             };
             let weight = areas[index] / row_share(index / RAY_COLUMNS).powi(2);
@@ -194,6 +208,10 @@ mod tests {
                 .collect();
             let beside = Noise::of_pair(&raw_of(&lost), &lost, &areas).points;
             assert!((beside / found - 1.0).abs() < 0.15, "{beside} {found}");
+            // Nor is a gain.
+            let gained: Vec<Option<f64>> = lost.iter().map(|own| own.map(|own| -own)).collect();
+            let beside = Noise::of_pair(&raw_of(&gained), &gained, &areas).points;
+            assert!((beside / 8.0 - 1.0).abs() < 0.35, "{beside}");
         }
     }
 

@@ -12,7 +12,8 @@
 //!    move farther ([`SMOOTHNESS_SHIFT`]).
 //! 3. These distances are those of usual walls. The mean thickness is known from the wall's width as far as that tells it
 //!    ([`wall_thickness`](super::wall_thickness)): all distances are scaled so that it is left.
-//! 4. Every node moves along its ray by the distance interpolated between the two surfaces, which
+//! 4. Where the muscle's volume is stated, they are scaled so that it is enclosed.
+//! 5. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
 //! The coefficients are a least-squares fit to simulated hearts with usual walls, which are known;
@@ -60,30 +61,35 @@ pub struct BlurredImage<'a> {
 }
 
 /// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall, and what is known of that
-/// wall's thickness. Where a direction has no wall at all, the mesh stays, and nothing is known.
+/// wall's thickness. The wall encloses `muscle_ml`, if that is stated, as nearly as its thinnest places allow. Where a
+/// direction has no wall at all, the mesh stays, and nothing is known.
 pub fn anatomical_mesh(
     mesh: &TriMesh,
     wall: &VentricleWall,
     image: &BlurredImage<'_>,
+    muscle_ml: Option<f64>,
 ) -> (TriMesh, Option<WallThickness>) {
-    let Some(shifts) = WallShifts::new(wall, image) else {
+    let Some(found) = WallShifts::new(wall, image) else {
         return (mesh.clone(), None);
     };
-    let moved = |share: f64| {
-        let mut moved = mesh.clone();
-        for p in &mut moved.vertices {
-            *p += shifts.at(wall, p) * share;
-        }
-        moved
+    let shifts = match muscle_ml {
+        Some(muscle_ml) => found.enclosing(muscle_ml, mesh, wall),
+        None => found,
     };
     // Large triangles may still cut through a thin wall.
     let moved = [1.0, 0.75, 0.5, 0.25]
         .into_iter()
-        .map(moved)
+        .map(|share| shifts.moved(mesh, wall, share))
         .find(|moved| self_intersections(moved).is_empty())
         .unwrap_or_else(|| mesh.clone());
     (moved, Some(shifts.thickness))
 }
+
+/// Factors of the shifts of a wall whose muscle is stated: from one that is thicker than it looks to one that is as thin
+/// as walls can be.
+const STATED_FACTORS: [f64; 2] = [-2.0, 6.0];
+/// Halvings of that range.
+const STATED_HALVINGS: usize = 24;
 
 /// Beginning and end of the wall on each ray, and the distances by which its surfaces move outward, mm.
 struct WallShifts {
@@ -136,6 +142,51 @@ impl WallShifts {
             outer_shift,
             thickness,
         })
+    }
+
+    /// The same scaled so that `mesh`, moved by them, encloses `muscle_ml`.
+    fn enclosing(&self, muscle_ml: f64, mesh: &TriMesh, wall: &VentricleWall) -> Self {
+        let [mut thick, mut thin] = STATED_FACTORS;
+        for _ in 0..STATED_HALVINGS {
+            let factor = f64::midpoint(thick, thin);
+            let enclosed_ml = self.times(factor).moved(mesh, wall, 1.0).volume() / 1000.0;
+            if enclosed_ml > muscle_ml {
+                thick = factor;
+            } else {
+                thin = factor;
+            }
+        }
+        self.times(f64::midpoint(thick, thin))
+    }
+
+    /// The same times a factor that is known to be right.
+    fn times(&self, factor: f64) -> Self {
+        let scaled = |map: &RayMap| RayMap(map.0.iter().map(|x| factor * x).collect());
+        let (mut inner_shift, mut outer_shift) =
+            (scaled(&self.inner_shift), scaled(&self.outer_shift));
+        keep_thinnest(
+            [&self.inner, &self.outer],
+            [&mut inner_shift, &mut outer_shift],
+        );
+        let look = self.thickness.look;
+        let loss_mm = mean_difference(&inner_shift, &outer_shift);
+        let mean_mm = look.apparent_mm - loss_mm + MEAN_THICKNESS_SHIFT_MM;
+        Self {
+            inner: self.inner.clone(),
+            outer: self.outer.clone(),
+            inner_shift,
+            outer_shift,
+            thickness: WallThickness::stated(mean_mm, look),
+        }
+    }
+
+    /// `mesh` with its surfaces moved by a share of the shifts.
+    fn moved(&self, mesh: &TriMesh, wall: &VentricleWall, share: f64) -> TriMesh {
+        let mut moved = mesh.clone();
+        for p in &mut moved.vertices {
+            *p += self.at(wall, p) * share;
+        }
+        moved
     }
 
     /// The displacement of a point of the apparent wall, mm.
@@ -251,6 +302,7 @@ fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<RayTerms> {
 }
 
 /// A number for each ray.
+#[derive(Clone)]
 struct RayMap(Vec<f64>);
 
 impl RayMap {

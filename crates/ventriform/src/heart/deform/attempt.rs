@@ -150,7 +150,14 @@ impl Attempt {
                     noise_length_mm: setup.noise_length_mm,
                     resolution_mm: parameters.resolution,
                 };
-                let both = WallSurfaces::new(apparent, cup, &orientation, &image, monitor)?;
+                let both = WallSurfaces::new(
+                    apparent,
+                    cup,
+                    &orientation,
+                    &image,
+                    parameters.muscle_ml,
+                    monitor,
+                )?;
                 let shown = both.at_edge(parameters.edge).clone();
                 ((shown.mesh, Some(shown.wall), shown.wall_ml), Some(both))
             }

@@ -39,7 +39,7 @@ pub struct WallSurfaces {
 
 impl WallSurfaces {
     /// Both walls of the ventricle whose apparent one is `apparent`, with its long axis along `cup`; `image` is that
-    /// about it.
+    /// about it. The anatomical one has `muscle_ml`, if that is stated.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -48,9 +48,10 @@ impl WallSurfaces {
         cup: &Cup,
         orientation: &PatientOrientation,
         image: &BlurredImage<'_>,
+        muscle_ml: Option<f64>,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let (mesh, thickness) = anatomical_mesh(&apparent.mesh, &apparent.wall, image);
+        let (mesh, thickness) = anatomical_mesh(&apparent.mesh, &apparent.wall, image, muscle_ml);
         let anatomical = WallSurface {
             wall: VentricleWall::new(&mesh, cup, &orientation.superior, monitor)?,
             wall_ml: mesh.volume() / 1000.0,

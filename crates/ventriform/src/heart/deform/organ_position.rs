@@ -1,6 +1,7 @@
 //! The position of an organ in a volume.
 
 use super::error::DeformError;
+use super::fitted_model::FittedModel;
 use super::parameters::DeformParameters;
 use crate::base::geometry::Vec3;
 use crate::base::geometry::bvh::Aabb;
@@ -13,6 +14,7 @@ use crate::image::grid::noise_length::noise_length_mm;
 use crate::image::grid::smoothness::smoothness_mm;
 use crate::image::locate;
 use crate::image::locate::body::{self, Blob};
+use crate::image::locate::cup::Cup;
 use crate::image::locate::localisation::Localisation;
 use crate::image::locate::patient_orientation::PatientOrientation;
 
@@ -45,6 +47,8 @@ pub enum OrganPosition {
         smoothness_mm: Option<f64>,
         /// The length of the image's noise beside it, mm ([`noise_length`](crate::image::grid::noise_length)).
         noise_length_mm: Option<f64>,
+        /// Whether the template lies in the patient already. Otherwise it is posed by its cup.
+        in_place: bool,
     },
     /// Any other organ.
     Body {
@@ -82,6 +86,7 @@ impl OrganPosition {
                     noise_length_mm: noise_length_beside(&found, volume, monitor)?,
                     found,
                     orientation,
+                    in_place: false,
                 }
             }
             None => {
@@ -93,6 +98,25 @@ impl OrganPosition {
         };
         monitor.report(Stage::Localise, 1.0)?;
         Ok(position)
+    }
+
+    /// The position of the ventricle that `model` shows, with its cup at `cup` and the patient's orientation `superior`, for
+    /// a template that lies there already; `None` for other organs.
+    pub fn of_fitted(model: &FittedModel, cup: Cup, superior: Vec3) -> Option<Self> {
+        let orientation = model.patient_orientation?;
+        Some(Self::Ventricle {
+            found: Localisation {
+                cup,
+                ..model.localisation.clone()?
+            },
+            orientation: PatientOrientation {
+                superior,
+                ..orientation
+            },
+            smoothness_mm: model.smoothness_mm,
+            noise_length_mm: model.noise_length_mm,
+            in_place: true,
+        })
     }
 
     /// The patient's orientation in the frame; the frame's own for organs other than ventricles.

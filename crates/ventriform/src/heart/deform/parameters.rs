@@ -46,6 +46,9 @@ pub struct DeformParameters {
     /// The image's resolution (full width of a point at half its maximum, motion and filter
     /// included), mm, 0..=30, for the anatomical wall. Default `None`: by calibration.
     pub resolution: Option<f64>,
+    /// Volume of the muscle, ml, 10..=600: the anatomical wall encloses it. Ventricles only. Default `None`: by the
+    /// wall's width.
+    pub muscle_ml: Option<f64>,
     /// How the camera turned, by which motion of the patient is judged. Default [`Orbit::Auto`].
     pub orbit: Orbit,
     /// The kind of motion.
@@ -68,6 +71,7 @@ impl Default for DeformParameters {
             margin: 0.0,
             edge: WallEdge::Apparent,
             resolution: None,
+            muscle_ml: None,
             orbit: Orbit::Auto,
             motion: Motion::default(),
         }
@@ -163,6 +167,7 @@ impl DeformParameters {
             ("blur", self.blur, 0.0, 10.0),
             ("margin", self.margin, -5.0, 5.0),
             ("resolution", self.resolution.unwrap_or(0.0), 0.0, 30.0),
+            ("muscle_ml", self.muscle_ml.unwrap_or(100.0), 10.0, 600.0),
             ("motion.mass", m.mass, 1e-6, 1e6),
             ("motion.damping", m.damping, 0.0, 1e6),
             ("motion.time_step", m.time_step, 1e-3, 1e3),

@@ -15,6 +15,7 @@ use crate::image::grid::field::Field;
 use crate::image::locate::localisation::Localisation;
 use crate::image::locate::patient_orientation::{OrientationSource, PatientOrientation};
 use crate::mesh::TriMesh;
+use nalgebra::Rotation3;
 
 /// Distance of the wall's apparent edge from the edge that the sensors find, mm outward, on the
 /// inner surface, the outer surface and the rim. Measured on simulated scans whose apparent edge
@@ -74,16 +75,22 @@ impl FitSetup {
         let (localisation, pose, axis, cavity_axis, uptake) = match (position, &template.cup) {
             (
                 OrganPosition::Ventricle {
-                    found, orientation, ..
+                    found,
+                    orientation,
+                    in_place,
+                    ..
                 },
                 Some(from),
             ) => {
                 let to = found.cup;
                 let roll = parameters.roll.to_radians();
-                let turn = if orientation.source.is_stated() {
-                    wall::turn_between(&from.axis, &to.axis, &orientation.superior)
+                let (from, turn) = if *in_place {
+                    (&to, Rotation3::identity())
+                } else if orientation.source.is_stated() {
+                    let turn = wall::turn_between(&from.axis, &to.axis, &orientation.superior);
+                    (from, turn)
                 } else {
-                    orientation.turn()
+                    (from, orientation.turn())
                 };
                 let pose = TemplatePose::of_ventricle(from, &to, &turn, roll);
                 let inner_end = to.base() + to.axis * (0.6 * to.length);

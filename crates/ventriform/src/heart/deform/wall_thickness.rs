@@ -97,6 +97,16 @@ impl WallThickness {
         Self::of_posterior(*look, &posterior)
     }
 
+    /// That of a wall whose muscle is stated, and which therefore is so thick.
+    pub fn stated(mean_mm: f64, look: WallLook) -> Self {
+        Self {
+            mean_mm,
+            sd_mm: 0.0,
+            interval_mm: [mean_mm; 2],
+            look,
+        }
+    }
+
     /// Its standard deviation over its mean.
     pub fn sd_share(&self) -> f64 {
         self.sd_mm / self.mean_mm

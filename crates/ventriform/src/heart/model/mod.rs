@@ -22,6 +22,9 @@ pub use wall_parts::wall_parts;
 
 use crate::mesh::TriMesh;
 
+/// Density of muscle, g/ml (Vinnakota and Bassingthwaighte, Am J Physiol 2004, have 1.053).
+pub const MYOCARDIAL_DENSITY_G_PER_ML: f64 = 1.05;
+
 /// The share of the mesh's area that belongs to each vertex (a third of its triangles'). The
 /// shares sum to 1.
 pub fn area_shares(mesh: &TriMesh) -> Vec<f64> {

@@ -129,7 +129,114 @@ provenance! {
     scan_arc,
 }
 
+/// A text without the spaces and separators around it, in capitals; `None` for an empty one.
+fn plain(text: &Option<String>) -> Option<String> {
+    let text = text.as_deref()?.trim_matches(['^', ' ']).to_uppercase();
+    (!text.is_empty()).then_some(text)
+}
+
+/// Two stated texts, if they differ in more than capitals.
+fn differing(a: &Option<String>, b: &Option<String>) -> Option<[String; 2]> {
+    let (a, b) = (a.as_deref()?.trim(), b.as_deref()?.trim());
+    let differ = !a.is_empty() && !b.is_empty() && !a.eq_ignore_ascii_case(b);
+    differ.then(|| [a.to_owned(), b.to_owned()])
+}
+
+/// A text that is there.
+fn stated(text: &Option<String>) -> Option<&str> {
+    let text = text.as_deref()?.trim();
+    (!text.is_empty()).then_some(text)
+}
+
 impl Provenance {
+    /// When the scan was made, or else its study: date, `YYYYMMDD`, and time, as the header has them.
+    pub fn moment(&self) -> Option<(&str, &str)> {
+        let acquired = stated(&self.acquisition_date).map(|date| (date, &self.acquisition_time));
+        let of_study = stated(&self.study_date).map(|date| (date, &self.study_time));
+        let (date, time) = acquired.or(of_study)?;
+        Some((date, stated(time).unwrap_or_default()))
+    }
+
+    /// The date of [`Provenance::moment`] as `YYYY-MM-DD`; another text as it is.
+    pub fn day(&self) -> Option<String> {
+        let (date, _) = self.moment()?;
+        let parts = (date.get(..4), date.get(4..6), date.get(6..8));
+        Some(match parts {
+            (Some(year), Some(month), Some(day)) if date.len() == 8 => {
+                format!("{year}-{month}-{day}")
+            }
+            _ => date.to_owned(),
+        })
+    }
+
+    /// The fields by which two headers name two patients. The name decides only where no number does: it changes by
+    /// marriage and by spelling.
+    pub fn other_patient(&self, other: &Self) -> Vec<&'static str> {
+        let differ =
+            |a: &Option<String>, b: &Option<String>| plain(a).zip(plain(b)).map(|(a, b)| a != b);
+        let number = differ(&self.patient_id, &other.patient_id);
+        let fields = [
+            ("Patient ID (0010,0020)", number),
+            (
+                "Patient's Birth Date (0010,0030)",
+                differ(&self.patient_birth_date, &other.patient_birth_date),
+            ),
+            (
+                "Patient's Sex (0010,0040)",
+                differ(&self.patient_sex, &other.patient_sex),
+            ),
+            (
+                "Patient's Name (0010,0010)",
+                differ(&self.patient_name, &other.patient_name).filter(|_| number != Some(false)),
+            ),
+        ];
+        let named = fields
+            .into_iter()
+            .filter(|(_, differ)| *differ == Some(true));
+        named.map(|(name, _)| name).collect()
+    }
+
+    /// The tracer, or else its nuclide.
+    pub fn tracer(&self) -> Option<String> {
+        let named = [&self.radiopharmaceutical, &self.radionuclide];
+        let stated = named
+            .into_iter()
+            .flatten()
+            .find(|text| !text.trim().is_empty());
+        stated.map(|text| text.trim().to_owned())
+    }
+
+    /// The tracers, or else their nuclides, where both headers state one and they differ.
+    pub fn other_tracer(&self, other: &Self) -> Option<[String; 2]> {
+        differing(&self.radiopharmaceutical, &other.radiopharmaceutical)
+            .or_else(|| differing(&self.radionuclide, &other.radionuclide))
+    }
+
+    /// What of camera and reconstruction both headers state and have otherwise.
+    pub fn made_otherwise(&self, other: &Self) -> Vec<(&'static str, [String; 2])> {
+        let fields = [
+            ("the camera", &self.model_name, &other.model_name),
+            ("the unit of uptake", &self.units, &other.units),
+            (
+                "the patient's position",
+                &self.patient_position,
+                &other.patient_position,
+            ),
+            (
+                "the reconstruction",
+                &self.reconstruction_method,
+                &other.reconstruction_method,
+            ),
+            (
+                "the filter",
+                &self.convolution_kernel,
+                &other.convolution_kernel,
+            ),
+        ];
+        let differ = |(field, a, b)| Some((field, differing(a, b)?));
+        fields.into_iter().filter_map(differ).collect()
+    }
+
     /// By how many degrees the camera turned; `None` where the header does not say. Rings of PET see all angles at once: 0.
     pub fn scan_arc_deg(&self) -> Option<f64> {
         if self.modality.as_deref().map(str::trim) == Some("PT") {
@@ -176,5 +283,59 @@ impl Provenance {
 impl fmt::Debug for Provenance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Provenance").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(change: impl Fn(&mut Provenance)) -> Provenance {
+        let text = |text: &str| Some(text.to_owned());
+        let mut scan = Provenance {
+            patient_id: text("17"),
+            patient_name: text("DOE^ANN^"),
+            patient_birth_date: text("19500102"),
+            patient_sex: text("F"),
+            ..Provenance::default()
+        };
+        change(&mut scan);
+        scan
+    }
+
+    #[test]
+    fn days_are_written_by_the_standard() {
+        let day = |date: &str| {
+            let made = scan(|s| s.study_date = Some(date.to_owned()));
+            made.day()
+        };
+        assert_eq!(day("20240507").as_deref(), Some("2024-05-07"));
+        assert_eq!(day(" "), None);
+        for other in ["2024", "2024-05-07", "ä0240507"] {
+            assert_eq!(day(other).as_deref(), Some(other));
+        }
+    }
+
+    /// Spelling is no other patient, nor is a new name with the old number; every other difference is.
+    #[test]
+    fn patients_are_told_apart_by_what_does_not_change() {
+        let text = |text: &str| Some(text.to_owned());
+        let one = scan(|_| {});
+        for same in [
+            scan(|s| s.patient_name = text("Doe^Ann")),
+            scan(|s| s.patient_name = text("MILLER^ANN")),
+            scan(|s| s.patient_birth_date = None),
+            scan(|s| s.patient_id = text("")),
+        ] {
+            assert_eq!(one.other_patient(&same), Vec::<&str>::new());
+        }
+        for other in [
+            scan(|s| s.patient_id = text("18")),
+            scan(|s| s.patient_birth_date = text("19500103")),
+            scan(|s| s.patient_sex = text("M")),
+            scan(|s| (s.patient_id, s.patient_name) = (None, text("MILLER^ANN"))),
+        ] {
+            assert!(!one.other_patient(&other).is_empty());
+        }
     }
 }

@@ -13,6 +13,7 @@ pub mod comparison;
 pub mod model;
 pub mod perfusion;
 pub mod segmentation;
+pub mod serial;
 mod unit;
 
 pub use crate::image::draw::document::HeadlineFigure;
@@ -371,6 +372,9 @@ pub const TABLES: &[(&str, &[Figure])] = &[
     ("ComparedScan", comparison::SCAN_FIGURES),
     ("ComparedTerritory", comparison::TERRITORY_FIGURES),
     ("ComparedSegment", comparison::SEGMENT_FIGURES),
+    ("SerialScan", serial::SCAN_FIGURES),
+    ("SerialPair", serial::PAIR_FIGURES),
+    ("SerialSegment", serial::SEGMENT_FIGURES),
     ("Perfusion", perfusion::FIGURES),
     ("TerritoryScore", perfusion::TERRITORY_FIGURES),
     ("SegmentScore", perfusion::SEGMENT_FIGURES),

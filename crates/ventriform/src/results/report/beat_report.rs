@@ -7,9 +7,10 @@ use super::input::FileFacts;
 use super::json_number::{or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
-use super::segmentation_report::{Resolution, SegmentationReport};
+use super::segmentation_report::Resolution;
 use crate::heart::beat::phase::HISTOGRAM_BINS;
 use crate::heart::beat::{Beat, Extreme, SegmentMotion};
+use crate::heart::model::MYOCARDIAL_DENSITY_G_PER_ML;
 use crate::image::volume::GateTiming;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -272,7 +273,7 @@ impl BeatReport {
             }),
             no_rates: beat.rates.as_ref().err().cloned(),
             wall_ml: round(mean),
-            mass_g: round(SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean),
+            mass_g: round(MYOCARDIAL_DENSITY_G_PER_ML * mean),
             wall_swing_percent: round(100.0 * swing / mean),
             segments: (beat.segments.iter())
                 .map(|segment| SegmentMotionReport::new(segment, &names[segment.segment - 1]))

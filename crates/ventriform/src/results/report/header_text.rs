@@ -1,11 +1,12 @@
 //! Result documents without text of the scans' headers.
 //!
 //! Whose scan a volume is may be erased, and not everybody who may read a result may see it. A store therefore keeps
-//! results without what headers say: series descriptions, tracers and doses of a comparison, the values that a flag
+//! results without what headers say: series descriptions, tracers, doses and dates of compared scans, the values that a flag
 //! compares, and the codes, names of structures and names of files that a warning quotes. Pages and objects are given
-//! it when they are made ([`ComparisonReport::with_scans`]). Sentences are told by how they begin.
+//! it when they are made ([`ComparisonReport::with_scans`], [`SerialReport::with_scans`]). Sentences are told by how they begin.
 
 use super::comparison_report::{ComparedScan, ComparisonReport};
+use super::serial_report::SerialReport;
 use crate::image::volume::Provenance;
 use serde_json::{Map, Value};
 use std::borrow::Cow;
@@ -34,8 +35,13 @@ const QUOTING_WARNINGS: [(&str, &str); 5] = [
     ),
 ];
 
-/// The fields of one of two compared scans that hold text of its header.
-const SCAN_FIELDS: [&str; 3] = ["series_description", "radiopharmaceutical", "injected_dose"];
+/// The fields of a compared scan that hold text of its header.
+const SCAN_FIELDS: [&str; 4] = [
+    "series_description",
+    "radiopharmaceutical",
+    "injected_dose",
+    "date",
+];
 
 /// A warning about a file without the values, names of structures and names of files that it quotes.
 pub fn warning(text: &str) -> Cow<'_, str> {
@@ -58,7 +64,11 @@ fn reason<'a>(code: &str, text: &'a str) -> Cow<'a, str> {
     let cut = |at: &str| text.split_once(at).map(|(before, _)| before);
     match code {
         "made_otherwise" => {
-            cut(" differs: ").map(|field| format!("{field} differs between stress and rest").into())
+            let scans = match text.contains(" in scan 1, ") {
+                true => "the scans",
+                false => "stress and rest",
+            };
+            cut(" differs: ").map(|field| format!("{field} differs between {scans}").into())
         }
         "not_comparable" => cut(": the tracer is ")
             .map(|before| format!("{before}: the headers name two tracers").into()),
@@ -105,8 +115,24 @@ impl ComparisonReport {
     }
 }
 
+impl SerialReport {
+    /// The report with what is to be shown of its scans, which stand in the order in which they were given.
+    #[must_use]
+    pub fn with_scans(mut self, scans: &[Provenance]) -> Self {
+        for own in &mut self.scans {
+            let Some(scan) = own.given.checked_sub(1).and_then(|at| scans.get(at)) else {
+                continue;
+            };
+            own.series_description.clone_from(&scan.series_description);
+            own.date = scan.day();
+        }
+        self
+    }
+}
+
 /// What a document that holds text of headers contains.
-const SIGNS: [&str; 10] = [
+const SIGNS: [&str; 11] = [
+    "\"date\": \"",
     "\"series_description\": \"",
     "\"radiopharmaceutical\": \"",
     "\"injected_dose\": \"",

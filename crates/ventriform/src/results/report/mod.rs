@@ -1,4 +1,4 @@
-//! Figures about a mesh, the report of a model, and the pages of a model, a segmentation, a beat and a comparison.
+//! Figures about a mesh, the report of a model, and the pages of a model, a segmentation, a beat and comparisons.
 //!
 //! [`measure`](measure::measure) takes any mesh and its reference surface S and gives counts and
 //! topology (self-intersections found exactly), shape (radius ratios, angles, edge lengths,
@@ -6,7 +6,7 @@
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
 //! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of
-//! a [`ComparisonReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for
+//! a [`ComparisonReport`], [`serial_page()`] one of a [`SerialReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for
 //! viewers that show nothing else: a [`DrawnPage`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
@@ -41,6 +41,8 @@ mod sections;
 mod segmentation_page;
 pub(crate) mod segmentation_report;
 mod segmentation_sheet;
+mod serial_page;
+mod serial_report;
 mod sheet_parts;
 mod stage_facts;
 mod summaries;
@@ -81,8 +83,12 @@ pub use segmentation_report::{
     SegmentationParts, SegmentationReport,
 };
 pub use segmentation_sheet::{SegmentationSheet, segmentation_sheet};
+pub use serial_page::{SerialPage, serial_page};
+pub use serial_report::{
+    FigureChangeReport, SerialPairReport, SerialReport, SerialScanReport, SerialSegmentReport,
+};
 pub use sheet_parts::DrawnPage;
 pub use summaries::{
     BeatSummary, ComparisonSummary, ModelSummary, NormalGroupSummary, NormalsSummary,
-    ReaderSummary, SegmentationSummary, TemplateSummary, object,
+    ReaderSummary, SegmentationSummary, SerialSummary, TemplateSummary, object,
 };

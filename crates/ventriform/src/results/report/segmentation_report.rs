@@ -15,6 +15,7 @@ use super::projections_report::ProjectionsReport;
 use super::raised_flag::RaisedFlag;
 use crate::base::geometry::Vec3;
 use crate::heart::judge::Fit;
+use crate::heart::model::MYOCARDIAL_DENSITY_G_PER_ML;
 use crate::heart::polar::PolarSummary;
 use crate::heart::reader::{ReaderOffsets, ReaderProfile};
 use crate::image::grid::agreement::Agreement;
@@ -201,9 +202,6 @@ pub struct SegmentationParts {
 }
 
 impl SegmentationReport {
-    /// Density of the myocardium, g/ml.
-    pub const MYOCARDIAL_DENSITY_G_PER_ML: f64 = 1.05;
-
     /// Joins the figures of `fit` to the other parts.
     pub fn new(fit: &Fit, parts: SegmentationParts) -> Self {
         let (fit, judgement) = (&fit.model, &fit.judgement);
@@ -224,10 +222,9 @@ impl SegmentationReport {
             fit: FitReport::new(fit, judgement),
             evidence: EvidenceReport::from_judgement(judgement),
             volumes_ml: FittedVolumes::new(fit, judgement),
-            mass_g: anatomical
-                .map(|surface| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
+            mass_g: anatomical.map(|surface| round(MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
             mass_interval_g: (judgement.volumes).map(|intervals| {
-                let grams = |wall_ml: f64| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * wall_ml);
+                let grams = |wall_ml: f64| round(MYOCARDIAL_DENSITY_G_PER_ML * wall_ml);
                 intervals.wall_ml.map(grams)
             }),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),

@@ -5,6 +5,7 @@ use super::comparison_report::ComparisonReport;
 use super::fit_report::FittedVolumes;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
+use super::serial_report::SerialReport;
 use crate::heart::comparison::Verdict;
 use crate::heart::normals::{GroupSex, NormalGroup, NormalLimits};
 use crate::heart::reader::{ReaderOffsets, ReaderProfile};
@@ -156,6 +157,30 @@ pub struct ComparisonSummary {
     pub flags: Vec<RaisedFlag>,
 }
 
+/// The main figures of a serial comparison, of its last scan against the first one; the report has all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct SerialSummary {
+    /// Number of scans.
+    pub scans: usize,
+    /// Change of the ejection fraction, points; `null` unless all scans are gated.
+    pub ef_change_points: Option<f64>,
+    /// Whether it changed.
+    pub ef_change_verdict: Option<Verdict>,
+    /// Share of the wall that lost uptake.
+    pub worse_percent: f64,
+    /// Whether wall lost uptake.
+    pub worse_verdict: Verdict,
+    /// Share of the wall that gained uptake.
+    pub better_percent: f64,
+    /// Whether wall gained uptake.
+    pub better_verdict: Verdict,
+    /// The least confidence of the fits, 0 to 1.
+    pub confidence: f64,
+    /// Reasons to look closer.
+    pub flags: Vec<RaisedFlag>,
+}
+
 /// The content of normal limits; the file has all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
@@ -190,6 +215,31 @@ pub struct NormalGroupSummary {
     pub cases: usize,
     /// Share of the wall below the limits of the others, mean over the people, per cent.
     pub mean_extent_percent: f64,
+}
+
+impl SerialSummary {
+    /// The main figures of `report`.
+    pub fn from_report(report: SerialReport) -> Self {
+        let last = report.scans.len();
+        let ef = report.change("ef_percent", 1, last);
+        let pair = (report.pairs.iter()).find(|pair| [pair.earlier, pair.later] == [1, last]);
+        let none = (0.0, Verdict::CannotTell);
+        let (worse, better) = pair.map_or((none, none), |pair| {
+            let worse = (pair.worse_percent, pair.worse_verdict);
+            (worse, (pair.better_percent, pair.better_verdict))
+        });
+        Self {
+            scans: last,
+            ef_change_points: ef.map(|own| own.change),
+            ef_change_verdict: ef.map(|own| own.verdict),
+            worse_percent: worse.0,
+            worse_verdict: worse.1,
+            better_percent: better.0,
+            better_verdict: better.1,
+            confidence: (report.scans.iter()).fold(1.0, |least, scan| least.min(scan.confidence)),
+            flags: report.flags,
+        }
+    }
 }
 
 impl ComparisonSummary {

@@ -31,6 +31,7 @@ use crate::runs::objects::ObjectError;
 use crate::runs::pipeline::PipelineError;
 use crate::runs::rest_stress::ComparisonError;
 use crate::runs::segmentation::SegmentationError;
+use crate::runs::serial::SerialError;
 use crate::surface::SurfaceError;
 use crate::surface::retile::RetileError;
 use std::error::Error;
@@ -374,6 +375,66 @@ impl Explain for ComparisonError {
 
     fn is_cancelled(&self) -> bool {
         matches!(self, ComparisonError::Cancelled(_))
+    }
+}
+
+impl Explain for SerialError {
+    fn explain(&self) -> Failure {
+        let numbered = |scan: &usize, mut told: Failure| {
+            told.detail = format!("scan {scan}: {}", told.detail);
+            told.to_sender = told
+                .to_sender
+                .map(|text| format!("scan {scan}: {text}").into());
+            told
+        };
+        let (kind, field, advice) = match self {
+            SerialError::Volume { scan, error } => return numbered(scan, error.explain()),
+            SerialError::Segmentation { scan, error } => return numbered(scan, error.explain()),
+            SerialError::Gated { scan, error } => return numbered(scan, error.explain()),
+            SerialError::ScanCount { .. } => (
+                (Fault::Request, "scan-count"),
+                Some("others"),
+                "Give 2 to 20 scans of one patient, each once.",
+            ),
+            SerialError::TooManyVoxels { .. } => (
+                (Fault::Content, "too-many-voxels"),
+                None,
+                "Compare fewer scans at once, or raise the limit on voxels.",
+            ),
+            SerialError::NoVentricle { .. } => (
+                (Fault::Request, "no-ventricle"),
+                Some("model"),
+                "Give a model of a left ventricle, or leave `model` out.",
+            ),
+            SerialError::SameScan { .. } => (
+                (Fault::Content, "same-scan"),
+                Some("others"),
+                "Give every scan once.",
+            ),
+            SerialError::OtherPatient { .. } => (
+                (Fault::Content, "other-patient"),
+                Some("others"),
+                "Give scans of one patient; if these are, and some were pseudonymised, set `same_patient` to true.",
+            ),
+            SerialError::MixedKinds { .. } => (
+                (Fault::Content, "mixed-kinds"),
+                Some("others"),
+                "Compare rest with rest and stress with stress, of one tracer, all corrected for attenuation or none; \
+                 rest with stress of one day is what `compare` is for.",
+            ),
+            SerialError::NothingInCommon { .. } => (
+                (Fault::Content, "nothing-in-common"),
+                None,
+                "Look at the polar maps with `segment`: one of the scans shows no left ventricle.",
+            ),
+            SerialError::Files(_) => ((Fault::Service, "unwritable"), None, ""),
+            SerialError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN),
+        };
+        failure(kind, self, field, advice.into())
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, SerialError::Cancelled(_))
     }
 }
 

@@ -6,6 +6,7 @@ use crate::base::progress::Monitor;
 use crate::heart::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::heart::deform::WallSurface;
 use crate::heart::judge::Flag;
+use crate::heart::model::MYOCARDIAL_DENSITY_G_PER_ML;
 use crate::heart::normals::{HeartFigure, Perfusion};
 use crate::heart::polar::SEGMENT_NAMES;
 use crate::image::volume::{
@@ -15,7 +16,6 @@ use crate::mesh::TriMesh;
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::results::report::{
     BeatParts, BeatReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
-    SegmentationReport,
 };
 use crate::runs::segmentation::{
     MadeOfSlices, Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare,
@@ -64,61 +64,76 @@ pub fn from_files(
             greatest,
         });
     }
-    let parameters = order.parameters.clone();
-    let make = |from: &FromProjections| fitted_sum(order, from, limits, monitor);
-    let (fitted, _) = with_motion(order.gates, &parameters, limits, monitor, make)?;
-    let FittedSum {
-        mut reading,
-        study,
-        segmentation,
-    } = fitted;
-    let model = &segmentation.fit.model;
-    let surfaces = model.surfaces.as_ref().ok_or(BeatError::NoVentricle)?;
-    let wall = surfaces.anatomical.clone();
-    let (Some(map), Some(resolution)) = (&segmentation.polar, segmentation.resolution) else {
-        return Err(BeatError::NoVentricle.into());
-    };
-    let density = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML;
-    let beat_parameters = BeatParameters {
-        thickness: surfaces.thickness,
-        muscle_ml: order.choice.mass_g.map(|mass| mass / density),
-        ..BeatParameters::default()
-    };
-    let fitted = beat::fit(
-        &study,
-        &wall.wall,
-        resolution.value,
-        &beat_parameters,
-        monitor,
-    )?;
-    let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
-    let beat = Beat::new(fitted, &study, map, rr_ms);
-    reading.gates = study.gates;
-    let judged = |limits| {
-        let figures = beat_figures(&segmentation, &beat);
-        let scan = reading.provenance();
-        judged_by_normals(&segmentation, &figures, scan, &parameters, limits)
-    };
-    let perfusion = order.normals.map(judged).transpose()?;
-    Ok(GatedHeart {
-        meshes: beat.fit.carried(&wall.mesh, &wall.wall),
-        perfusion,
-        sum: study.sum,
-        reading,
-        wall,
-        beat,
-        parameters,
-        choice: order.choice,
-        rr_ms,
-        segmentation,
-    })
+    fitted_sum(order, limits, monitor)?.beat(order, monitor)
+}
+
+impl FittedSum {
+    /// The beat of these gates.
+    ///
+    /// # Errors
+    /// [`GatedError`].
+    pub(crate) fn beat(
+        self,
+        order: &GatedOrder<'_>,
+        monitor: &Monitor<'_>,
+    ) -> Result<GatedHeart, GatedError> {
+        let FittedSum {
+            mut reading,
+            study,
+            segmentation,
+        } = self;
+        let parameters = order.parameters.clone();
+        let model = &segmentation.fit.model;
+        let surfaces = model.surfaces.as_ref().ok_or(BeatError::NoVentricle)?;
+        let wall = surfaces.anatomical.clone();
+        let (Some(map), Some(resolution)) = (&segmentation.polar, segmentation.resolution) else {
+            return Err(BeatError::NoVentricle.into());
+        };
+        let beat_parameters = BeatParameters {
+            thickness: surfaces.thickness,
+            muscle_ml: (parameters.mass_g).map(|mass_g| mass_g / MYOCARDIAL_DENSITY_G_PER_ML),
+            ..BeatParameters::default()
+        };
+        let fitted = beat::fit(
+            &study,
+            &wall.wall,
+            resolution.value,
+            &beat_parameters,
+            monitor,
+        )?;
+        let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
+        let beat = Beat::new(fitted, &study, map, rr_ms);
+        reading.gates = study.gates;
+        let judged = |limits| {
+            let figures = beat_figures(&segmentation, &beat);
+            let scan = reading.provenance();
+            judged_by_normals(&segmentation, &figures, scan, &parameters, limits)
+        };
+        let perfusion = order.normals.map(judged).transpose()?;
+        Ok(GatedHeart {
+            meshes: beat.fit.carried(&wall.mesh, &wall.wall),
+            perfusion,
+            sum: study.sum,
+            reading,
+            wall,
+            beat,
+            parameters,
+            choice: order.choice,
+            rr_ms,
+            segmentation,
+        })
+    }
 }
 
 /// The gates' sum and its segmentation.
-struct FittedSum {
-    reading: GatedReading,
-    study: GatedStudy,
-    segmentation: Segmentation,
+#[derive(Debug)]
+pub(crate) struct FittedSum {
+    /// The files, without the gates.
+    pub reading: GatedReading,
+    /// The gates and their sum.
+    pub study: GatedStudy,
+    /// The segmentation of the sum.
+    pub segmentation: Segmentation,
 }
 
 impl MadeOfSlices for FittedSum {
@@ -132,8 +147,22 @@ impl MadeOfSlices for FittedSum {
     }
 }
 
+/// The gates' sum, segmented; of projections with the heart's motion measured, and corrected if the parameters ask for it.
+///
+/// # Errors
+/// [`GatedError`].
+pub(crate) fn fitted_sum(
+    order: &GatedOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<FittedSum, GatedError> {
+    let make = |from: &FromProjections| made_of(order, from, limits, monitor);
+    let (fitted, _) = with_motion(order.gates, order.parameters, limits, monitor, make)?;
+    Ok(fitted)
+}
+
 /// The segmentation of the sum of gates that are made as `from` says.
-fn fitted_sum(
+fn made_of(
     order: &GatedOrder<'_>,
     from: &FromProjections,
     limits: &ReadLimits,
@@ -197,8 +226,8 @@ pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure
 impl GatedHeart {
     /// Reasons to look closer by what the file says of the beats, and by what the caller says of the wall.
     fn stated_flags(&self) -> Vec<BeatFlag> {
-        let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * self.beat.mean_wall_ml();
-        let given = self.choice.mass_g;
+        let found_g = MYOCARDIAL_DENSITY_G_PER_ML * self.beat.mean_wall_ml();
+        let given = self.parameters.mass_g;
         let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let mass = given.and_then(|given_g| BeatFlag::of_mass(given_g, found_g));
         rejected.into_iter().chain(mass).collect()

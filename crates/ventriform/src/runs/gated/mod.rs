@@ -15,6 +15,7 @@ mod order;
 mod pictures;
 
 pub use error::GatedError;
+pub(crate) use from_files::{FittedSum, fitted_sum};
 pub use from_files::{GatedHeart, beat_figures, from_files};
 pub use names::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, gate_labels, is_gate_mesh};
 pub use order::GatedOrder;

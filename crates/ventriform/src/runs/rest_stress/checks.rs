@@ -15,11 +15,11 @@ use crate::runs::gated::GatedHeart;
 
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
 /// per cent for every millimetre of blur.
-const RESOLUTION_MM: f64 = 1.5;
+pub(crate) const RESOLUTION_MM: f64 = 1.5;
 /// Share of the wall that is reversible from which TID is uncertain, per cent.
 const LARGE_REVERSIBLE_PERCENT: f64 = 10.0;
 /// Share of the wall that sets the scale below which it is uncertain, per cent.
-const FEW_MATCHED_PERCENT: f64 = 40.0;
+pub(crate) const FEW_MATCHED_PERCENT: f64 = 40.0;
 
 /// Refuses, before anything is fitted, one scan given twice, and scans of two patients unless the caller says that they
 /// are one.
@@ -42,7 +42,7 @@ pub(super) fn refuse(
         if a.sop_instance_uid.is_some() && a.sop_instance_uid == b.sop_instance_uid {
             return Err(ComparisonError::SameScan("they have one SOP Instance UID"));
         }
-        let differ = other_patient(&a, &b);
+        let differ = a.other_patient(&b);
         if !differ.is_empty() && !order.parameters.choice.same_patient {
             return Err(ComparisonError::OtherPatient(differ));
         }
@@ -68,37 +68,6 @@ pub(super) fn refuse_fits(
 
 fn same_voxels() -> ComparisonError {
     ComparisonError::SameScan("they have the same voxels")
-}
-
-/// The fields by which the headers name two patients. The name decides only where no number does: it changes by
-/// marriage and by spelling.
-fn other_patient(a: &Provenance, b: &Provenance) -> Vec<&'static str> {
-    let plain = |text: &Option<String>| {
-        let text = text.as_deref()?.trim_matches(['^', ' ']).to_uppercase();
-        (!text.is_empty()).then_some(text)
-    };
-    let differ =
-        |a: &Option<String>, b: &Option<String>| plain(a).zip(plain(b)).map(|(a, b)| a != b);
-    let number = differ(&a.patient_id, &b.patient_id);
-    let fields = [
-        ("Patient ID (0010,0020)", number),
-        (
-            "Patient's Birth Date (0010,0030)",
-            differ(&a.patient_birth_date, &b.patient_birth_date),
-        ),
-        (
-            "Patient's Sex (0010,0040)",
-            differ(&a.patient_sex, &b.patient_sex),
-        ),
-        (
-            "Patient's Name (0010,0010)",
-            differ(&a.patient_name, &b.patient_name).filter(|_| number != Some(false)),
-        ),
-    ];
-    let named = fields
-        .into_iter()
-        .filter(|(_, differ)| *differ == Some(true));
-    named.map(|(name, _)| name).collect()
 }
 
 /// Reasons to look closer.
@@ -214,7 +183,7 @@ fn of_one(field: &'static str, stated: [Option<String>; 2]) -> Option<Comparison
 /// Differences between the headers in patient, times and acquisition.
 fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
     let mut flags = Vec::new();
-    let patient = other_patient(stress, rest);
+    let patient = stress.other_patient(rest);
     if !patient.is_empty() {
         flags.push(ComparisonFlag::NotComparable(Reason::Patient(patient)));
     }
@@ -236,57 +205,21 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
         let corrected = corrections.map(|is| is.map(|_| "corrected".to_owned()));
         flags.extend(of_one("attenuation correction", corrected));
     }
-    let differing = |a: &Option<String>, b: &Option<String>| {
-        let (a, b) = (a.as_deref()?.trim(), b.as_deref()?.trim());
-        let differ = !a.is_empty() && !b.is_empty() && !a.eq_ignore_ascii_case(b);
-        differ.then(|| (a.to_owned(), b.to_owned()))
-    };
-    let tracers = [
-        (&stress.radiopharmaceutical, &rest.radiopharmaceutical),
-        (&stress.radionuclide, &rest.radionuclide),
-    ];
-    if let Some((stress, rest)) = tracers.into_iter().find_map(|(a, b)| differing(a, b)) {
+    if let Some([stress, rest]) = stress.other_tracer(rest) {
         flags.push(ComparisonFlag::NotComparable(Reason::Tracer {
             stress,
             rest,
         }));
     }
-    let tracer = |scan: &Provenance| {
-        let named = [&scan.radiopharmaceutical, &scan.radionuclide];
-        let stated = named
-            .into_iter()
-            .flatten()
-            .find(|text| !text.trim().is_empty());
-        stated.map(|text| text.trim().to_owned())
-    };
-    flags.extend(of_one("tracer", [stress, rest].map(tracer)));
-    for (field, a, b) in [
-        ("the camera", &stress.model_name, &rest.model_name),
-        ("the unit of uptake", &stress.units, &rest.units),
-        (
-            "the patient's position",
-            &stress.patient_position,
-            &rest.patient_position,
-        ),
-        (
-            "the reconstruction",
-            &stress.reconstruction_method,
-            &rest.reconstruction_method,
-        ),
-        (
-            "the filter",
-            &stress.convolution_kernel,
-            &rest.convolution_kernel,
-        ),
-    ] {
-        if let Some((stress, rest)) = differing(a, b) {
-            flags.push(ComparisonFlag::MadeOtherwise {
-                field,
-                stress,
-                rest,
-            });
-        }
-    }
+    flags.extend(of_one("tracer", [stress, rest].map(Provenance::tracer)));
+    let otherwise = stress.made_otherwise(rest).into_iter();
+    flags.extend(
+        otherwise.map(|(field, [stress, rest])| ComparisonFlag::MadeOtherwise {
+            field,
+            stress,
+            rest,
+        }),
+    );
     flags
 }
 
@@ -308,29 +241,6 @@ mod tests {
         };
         change(&mut scan);
         scan
-    }
-
-    /// Spelling is no other patient, nor is a new name with the old number; every other difference is.
-    #[test]
-    fn patients_are_told_apart_by_what_does_not_change() {
-        let text = |text: &str| Some(text.to_owned());
-        let one = scan(|_| {});
-        for same in [
-            scan(|s| s.patient_name = text("Doe^Ann")),
-            scan(|s| s.patient_name = text("MILLER^ANN")),
-            scan(|s| s.patient_birth_date = None),
-            scan(|s| s.patient_id = text("")),
-        ] {
-            assert_eq!(other_patient(&one, &same), Vec::<&str>::new());
-        }
-        for other in [
-            scan(|s| s.patient_id = text("18")),
-            scan(|s| s.patient_birth_date = text("19500103")),
-            scan(|s| s.patient_sex = text("M")),
-            scan(|s| (s.patient_id, s.patient_name) = (None, text("MILLER^ANN"))),
-        ] {
-            assert!(!other_patient(&one, &other).is_empty());
-        }
     }
 
     #[test]

@@ -57,7 +57,7 @@ impl ComparedHearts {
         monitor.report(Stage::Export, 0.5)?;
         for (scan, heart) in self.hearts() {
             let mesh = heart.mesh();
-            let metadata = heart.metadata(scan, monitor)?;
+            let metadata = heart.metadata(format!("Left ventricle at {scan}"), monitor)?;
             for format in formats {
                 monitor.check()?;
                 files.push(NamedFile {

@@ -113,10 +113,10 @@ impl ComparedHeart {
         SourceScan::new(identity, image.frame.clone(), image.shape, placed, made)
     }
 
-    /// The description that files of the mesh hold.
-    pub(super) fn metadata(
+    /// The description that files of the mesh hold, under this title.
+    pub(crate) fn metadata(
         &self,
-        which: WhichScan,
+        title: String,
         monitor: &Monitor<'_>,
     ) -> Result<Metadata, Cancelled> {
         let (segmentation, mesh) = (self.segmentation(), self.mesh());
@@ -126,7 +126,7 @@ impl ComparedHeart {
                 .and_then(|scan| scan.frame_of_reference().map(str::to_owned)),
             parts: segmentation.parts(mesh, monitor)?,
             field: segmentation.uptake(mesh),
-            ..Metadata::new(format!("Left ventricle at {}", which.as_str()))
+            ..Metadata::new(title)
         })
     }
 

@@ -21,6 +21,7 @@ mod order;
 mod report;
 mod slices;
 
+pub(crate) use checks::{FEW_MATCHED_PERCENT, RESOLUTION_MM};
 pub use error::ComparisonError;
 pub use from_files::from_files;
 pub use hearts::{ComparedHeart, ComparedHearts};

@@ -28,6 +28,16 @@ struct Done {
 }
 
 impl OrganSearch {
+    /// A search for a ventricle that found it at `position`.
+    pub(crate) fn of_ventricle(position: OrganPosition) -> Self {
+        Self {
+            done: Some(Done {
+                of_ventricle: true,
+                position: Ok(position),
+            }),
+        }
+    }
+
     /// The position of the organ of `template` in `volume`. Volume and parameters must be the same
     /// in all calls.
     ///

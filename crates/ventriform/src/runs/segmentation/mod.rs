@@ -60,5 +60,6 @@ pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use normals::{heart_figures, judged_by_normals};
 pub use order::{NamedMesh, NamedReader, SegmentationOrder};
+pub(crate) use segment::segment_at;
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
 pub use templates::prepare;

@@ -106,7 +106,28 @@ pub fn segment(
     expert: Option<&Mask>,
     monitor: &Monitor,
 ) -> Result<Segmentation, SegmentationError> {
-    let mut search = OrganSearch::default();
+    segment_at(
+        OrganSearch::default(),
+        volume,
+        templates,
+        parameters,
+        expert,
+        monitor,
+    )
+}
+
+/// The same with the organ where `search` has it, if it has been searched there.
+///
+/// # Errors
+/// [`SegmentationError`].
+pub(crate) fn segment_at(
+    mut search: OrganSearch,
+    volume: &Volume,
+    templates: &[NamedTemplate],
+    parameters: &SegmentationParameters,
+    expert: Option<&Mask>,
+    monitor: &Monitor,
+) -> Result<Segmentation, SegmentationError> {
     let trials = try_all(volume, templates, &parameters.deform, &mut search, monitor)?;
     let kept = parameters.kept_model.as_deref();
     let (chosen, fit) = match (trials.best(kept, parameters.deform.edge), kept) {

@@ -10,7 +10,7 @@
 //!    `measurements` with `normals`, `capture`).
 //! 4. [`nuclear_image`]: slices that were reconstructed here.
 //! 5. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest
-//!    and stress: a report and pictures.
+//!    and stress: a report and pictures; [`DicomSerial`] for scans over the years: a report.
 //!
 //! The picture of a page names patient and study in its pixels (Burned In Annotation YES), unless the scan is freed of
 //! the identity.
@@ -35,6 +35,7 @@ mod measurements;
 mod normals;
 mod nuclear;
 mod segmentation;
+mod serial;
 mod source;
 mod stl;
 mod structure_set;
@@ -49,6 +50,7 @@ pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use comparison::{ComparisonObject, DicomComparison};
 pub use nuclear::{nuclear_image, nuclear_projections};
+pub use serial::DicomSerial;
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use ventriform_dicom::write::data_set::{
     IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start,
