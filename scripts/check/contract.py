@@ -348,6 +348,22 @@ def rest_and_stress(walk, folder, rest, normals):
     return comparison
 
 
+def serials(walk, folder, first):
+    """Scans of one patient over the years: the first one, and the one that `rest_and_stress` stored."""
+    call = walk.call
+    scan = open(os.path.join(folder, "stress", "spect.nii.gz"), "rb").read()
+    octets = {"content-type": "application/octet-stream"}
+    request = urllib.request.Request(f"{URL}/v1/volumes", data=scan, headers=octets, method="POST")
+    stored = json.load(urllib.request.urlopen(request))
+    order = {"scans": [first, stored["id"]], "parameters": {"same_patient": True}}
+    _, job = call("post", "/v1/serials", expect=202, body=order)
+    serial = wait(walk, job)["serial"]
+    waiting = {"prefer": UNTIL_DONE, "accept": "application/json"}
+    call("post", "/v1/serials", expect=200, body=order, headers=waiting)
+    call("get", "/v1/serials", expect=200)
+    return serial
+
+
 def workitems(walk):
     """A work item's life: scheduled, claimed, changed, canceled, erased."""
     uid, transaction = "1.2.840.99999.3", {"vr": "UI", "Value": ["1.2.840.99999.4"]}
@@ -497,6 +513,7 @@ def everything(walk, folder):
     beat = wait(walk, job)["beat"]
     call("get", "/v1/beats", expect=200)
     comparison = rest_and_stress(walk, folder, volume["id"], normals)
+    serial = serials(walk, folder, volume["id"])
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
@@ -512,6 +529,7 @@ def everything(walk, folder):
         "segmentations": segmentation,
         "beats": beat,
         "comparisons": comparison,
+        "serials": serial,
         "normals": normals,
         "templates": added["id"],
         "readers": reader["id"],
@@ -519,7 +537,8 @@ def everything(walk, folder):
     }
     for template, item in walk.contract.document["paths"].items():
         found = re.match(
-            r"/v1/(models|segmentations|beats|comparisons|normals|templates|readers|volumes)/\{id\}(/.*)?$", template
+            r"/v1/(models|segmentations|beats|comparisons|serials|normals|templates|readers|volumes)/\{id\}(/.*)?$",
+            template,
         )
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
@@ -534,7 +553,7 @@ def everything(walk, folder):
                     own = from_views
                 else:
                     own = made
-                call("get", template, expect=200, id=own, file=name.replace("NN", "01"))
+                call("get", template, expect=200, id=own, file=name.replace("NN_NN", "01_02").replace("NN", "01"))
 
     webhooks(walk, order)
     received(walk)

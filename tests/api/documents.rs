@@ -61,6 +61,15 @@ const REPORTS: &[(&str, &str)] = &[
     ("ComparedScan", "Comparison: `stress` and `rest`"),
     ("ComparedTerritory", "Comparison: each of `territories`"),
     ("ComparedSegment", "Comparison: each of `segments`"),
+    (
+        "SerialScan",
+        "Serial comparison, `serial.json`: each of `scans`",
+    ),
+    ("SerialPair", "Serial comparison: each of `pairs`"),
+    (
+        "SerialSegment",
+        "Serial comparison: each of `segments` of a pair",
+    ),
     ("Perfusion", "Beside normal limits: `perfusion`"),
     (
         "TerritoryScore",
@@ -118,6 +127,7 @@ fn the_page_of_flags_has_every_flag() {
         "heart/beat/flags.rs",
         "heart/comparison/flags.rs",
         "heart/normals/flags.rs",
+        "heart/serial/flags.rs",
     ] {
         let path = root.join("crates/ventriform/src").join(file);
         let source = std::fs::read_to_string(path).unwrap();

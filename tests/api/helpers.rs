@@ -585,6 +585,10 @@ impl Work for FakeWork {
             let rename = |file| name_as(file, "mesh_stress", "comparison.json");
             output.files.iter_mut().for_each(rename);
         }
+        if self.makes() == Resource::Serial {
+            let rename = |file| name_as(file, "mesh_scan01", "serial.json");
+            output.files.iter_mut().for_each(rename);
+        }
         if self.makes() == Resource::Normals {
             output.files.clear();
             output.files.push(OutputFile {
@@ -610,7 +614,8 @@ impl Work for FakeWork {
         stored: &StoredItem,
         _scans: &[serde_json::Map<String, serde_json::Value>],
     ) -> Result<String, Failure> {
-        let mut names = ["report.json", "beat.json", "comparison.json"].into_iter();
+        let names = ["report.json", "beat.json", "comparison.json", "serial.json"];
+        let mut names = names.into_iter();
         let report = names.find_map(|name| stored.read(name).unwrap()).unwrap();
         let report = String::from_utf8(report).unwrap();
         Ok(format!("<!doctype html><title>report</title>{report}"))

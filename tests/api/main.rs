@@ -63,6 +63,7 @@ mod scans;
 mod scu;
 mod security;
 mod segmentations;
+mod serials;
 mod shutdown;
 mod storage;
 mod stores_found;

@@ -91,12 +91,13 @@ fn a_request_for_a_job_is_told_by_its_kind() {
     assert_eq!(request["discriminator"]["propertyName"], "kind");
     let mapping = request["discriminator"]["mapping"].as_object().unwrap();
     let one_of = request["oneOf"].as_array().unwrap();
-    assert_eq!((mapping.len(), one_of.len()), (5, 5));
+    assert_eq!((mapping.len(), one_of.len()), (6, 6));
     for (kind, parameters) in [
         ("model", "ModelParameters"),
         ("segmentation", "SegmentationParameters"),
         ("beat", "BeatParameters"),
         ("comparison", "ComparisonParameters"),
+        ("serial", "SerialParameters"),
         ("normals", "NormalsParameters"),
     ] {
         assert!(
@@ -293,6 +294,7 @@ fn bytes_are_binary_and_reports_are_typed() {
         ("/v1/segmentations/{id}/report", "SegmentationReport"),
         ("/v1/beats/{id}/report", "BeatReport"),
         ("/v1/comparisons/{id}/report", "ComparisonReport"),
+        ("/v1/serials/{id}/report", "SerialReport"),
     ] {
         let answer = &document["paths"][path]["get"]["responses"]["200"];
         let reference = text(&answer["content"]["application/json"]["schema"]["$ref"]);

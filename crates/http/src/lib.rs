@@ -31,26 +31,14 @@ mod router;
 mod serve;
 mod wire;
 
-use serde::Serialize;
-use serde_json::Serializer;
-use serde_json::ser::PrettyFormatter;
-
 pub use app::App;
 pub use edge::connections::tls::{Tls, TlsError};
 pub use edge::cryptography::install_cryptography;
 pub use serve::serve;
 
-/// The OpenAPI document, as committed under `openapi/`: a line for each value, so that changes can be read.
-///
-/// # Panics
-/// Never: writing into memory does not fail.
+/// The OpenAPI document, as committed under `openapi/`.
 pub fn document_json() -> String {
-    let mut text = Vec::new();
-    let indented = PrettyFormatter::with_indent(b" ");
-    let mut writer = Serializer::with_formatter(&mut text, indented);
-    let written = router::document().serialize(&mut writer);
-    written.expect("memory takes all");
-    String::from_utf8(text).expect("JSON is UTF-8") + "\n"
+    openapi::written(&router::document())
 }
 
 /// The examples of README.md, compiled as tests.

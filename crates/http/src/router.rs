@@ -31,6 +31,8 @@ use crate::resources::readers::{PROFILE_SIZE, Readers};
 use crate::resources::scan_erasures;
 use crate::resources::segmentations;
 use crate::resources::segmentations::Segmentations;
+use crate::resources::serials;
+use crate::resources::serials::Serials;
 use crate::resources::templates;
 use crate::resources::templates::{MESH_SIZE, Templates};
 use crate::resources::volume_download;
@@ -69,6 +71,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         collection::routes::<Segmentations>().to_vec(),
         collection::routes::<Beats>().to_vec(),
         collection::routes::<Comparisons>().to_vec(),
+        collection::routes::<Serials>().to_vec(),
         collection::routes::<Normals>().to_vec(),
         collection::routes::<Templates>().to_vec(),
         collection::routes::<Readers>().to_vec(),
@@ -77,11 +80,12 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Segmentations>(),
         products::routes::<Beats>(),
         products::routes::<Comparisons>(),
+        products::routes::<Serials>(),
         products::routes::<Normals>(),
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 43] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 44] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -99,6 +103,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(segmentations::create_segmentation).layer(upload()),
         routes!(beats::create_beat).layer(upload()),
         routes!(comparisons::create_comparison).layer(upload()),
+        routes!(serials::create_serial).layer(json(settings.json_limit)),
         routes!(normals::create_normals).layer(json(NORMALS_SIZE)),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(readers::create_reader).layer(json(PROFILE_SIZE)),

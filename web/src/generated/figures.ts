@@ -1003,6 +1003,225 @@ export const FIGURES = {
       "signed": true
     }
   ],
+  "SerialPair": [
+    {
+      "place": "worse_percent",
+      "label": "Worse",
+      "about": "Share of the wall that lost uptake, as far as half of the depth of the loss.",
+      "unit": "%",
+      "digits": 0,
+      "short": "worse",
+      "interval": "worse_interval_percent",
+      "verdict": "worse_verdict",
+      "headline": true,
+      "code": "WORSE, 99VENTRIFORM"
+    },
+    {
+      "place": "better_percent",
+      "label": "Better",
+      "about": "Share of the wall that gained uptake.",
+      "unit": "%",
+      "digits": 0,
+      "short": "better",
+      "interval": "better_interval_percent",
+      "verdict": "better_verdict",
+      "headline": true,
+      "code": "BETTER, 99VENTRIFORM"
+    },
+    {
+      "place": "dark_in_both_percent",
+      "label": "Below the threshold in both",
+      "about": "Share of the wall below the threshold in both scans.",
+      "unit": "%",
+      "digits": 0,
+      "headline": true
+    },
+    {
+      "place": "lost_percent",
+      "label": "Uptake lost",
+      "about": "What the later scan lacks where uptake was lost, in per cent of the whole wall's uptake.",
+      "unit": "%",
+      "digits": 1,
+      "headline": true
+    },
+    {
+      "place": "detectable_percent",
+      "label": "Least loss that would show",
+      "about": "The least loss of a territory that is found in nine of ten pairs with this noise.",
+      "unit": "%",
+      "digits": 0,
+      "headline": true
+    }
+  ],
+  "SerialScan": [
+    {
+      "place": "ef_percent",
+      "label": "Ejection fraction",
+      "about": "Share of the end-diastolic volume that a beat ejects.",
+      "unit": "%",
+      "digits": 0,
+      "short": "EF",
+      "headline": true,
+      "code": "70822001, SCT"
+    },
+    {
+      "place": "edv_ml",
+      "label": "End-diastolic volume",
+      "about": "The largest volume of the cavity over the beat.",
+      "unit": "ml",
+      "digits": 0,
+      "short": "EDV",
+      "headline": true
+    },
+    {
+      "place": "esv_ml",
+      "label": "End-systolic volume",
+      "about": "The smallest volume of the cavity over the beat.",
+      "unit": "ml",
+      "digits": 0,
+      "short": "ESV",
+      "headline": true
+    },
+    {
+      "place": "cavity_ml",
+      "label": "Cavity",
+      "about": "Volume of the cavity in the image of all gates.",
+      "unit": "ml",
+      "digits": 0,
+      "short": "cavity",
+      "headline": true
+    },
+    {
+      "place": "mass_g",
+      "label": "Mass",
+      "about": "Mass of the muscle by the fit of the scan alone; the volumes of all scans stand on one common mass.",
+      "unit": "g",
+      "digits": 0,
+      "short": "mass",
+      "headline": true
+    },
+    {
+      "place": "dark_percent",
+      "label": "Below the threshold",
+      "about": "Share of the wall below the threshold, a share of the scan's own maximum.",
+      "unit": "%",
+      "digits": 0,
+      "short": "below the threshold",
+      "headline": true,
+      "code": "427751006, SCT"
+    },
+    {
+      "place": "extent_percent",
+      "label": "Below the limit",
+      "about": "Share of the wall below the normal limit.",
+      "unit": "%",
+      "digits": 0,
+      "short": "extent",
+      "headline": true
+    },
+    {
+      "place": "deficit_percent",
+      "label": "Deficit score",
+      "about": "Mean score of the wall, in per cent of the greatest.",
+      "unit": "%",
+      "digits": 1,
+      "short": "deficit",
+      "headline": true,
+      "code": "DEFICIT, 99VENTRIFORM"
+    },
+    {
+      "place": "summed_score",
+      "label": "Summed score",
+      "about": "Sum of the segments' scores.",
+      "unit": "of 68",
+      "digits": 0,
+      "short": "summed score",
+      "headline": true
+    },
+    {
+      "place": "motion_mm",
+      "label": "Motion",
+      "about": "Inward motion from end diastole to end systole, the mean of the segments.",
+      "unit": "mm",
+      "digits": 1,
+      "short": "motion",
+      "headline": true
+    },
+    {
+      "place": "thickening_percent",
+      "label": "Thickening",
+      "about": "Thickening from end diastole to end systole, the mean of the segments.",
+      "unit": "%",
+      "digits": 0,
+      "short": "thickening",
+      "headline": true
+    },
+    {
+      "place": "phase_sd_degrees",
+      "label": "Phase SD",
+      "about": "Standard deviation of the phases of the wall.",
+      "unit": "°",
+      "digits": 0,
+      "short": "phase SD",
+      "headline": true
+    },
+    {
+      "place": "phase_bandwidth_degrees",
+      "label": "Phase bandwidth",
+      "about": "Width of the range that holds 95 % of the phases.",
+      "unit": "°",
+      "digits": 0,
+      "short": "phase bandwidth",
+      "headline": true
+    }
+  ],
+  "SerialSegment": [
+    {
+      "place": "earlier_percent",
+      "label": "earlier",
+      "about": "Mean uptake in the earlier scan.",
+      "unit": "%",
+      "digits": 0,
+      "headline": true,
+      "code": "251053005, SCT"
+    },
+    {
+      "place": "later_percent",
+      "label": "later",
+      "about": "Mean uptake in the later scan, scaled to the earlier one.",
+      "unit": "%",
+      "digits": 0,
+      "headline": true
+    },
+    {
+      "place": "change_points",
+      "label": "change",
+      "about": "Uptake in the later scan less that in the earlier one.",
+      "unit": "points",
+      "digits": 0,
+      "verdict": "change_verdict",
+      "signed": true,
+      "headline": true
+    },
+    {
+      "place": "motion_change_mm",
+      "label": "motion, change",
+      "about": "Inward motion in the later scan less that in the earlier one.",
+      "unit": "mm",
+      "digits": 1,
+      "signed": true,
+      "headline": true
+    },
+    {
+      "place": "thickening_change_points",
+      "label": "thickening, change",
+      "about": "Thickening in the later scan less that in the earlier one.",
+      "unit": "points",
+      "digits": 0,
+      "signed": true,
+      "headline": true
+    }
+  ],
   "TerritoryScore": [
     {
       "place": "extent_percent",

@@ -329,7 +329,7 @@ export interface components {
              * @default 0.1
              */
             mass?: number;
-            /** @description Mass of the left ventricle's muscle, g, where it is known: the image does not tell how thick the wall is. Default: the usual thickness is assumed */
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
             mass_g?: number;
             /**
              * @description Maximum number of time steps
@@ -1019,6 +1019,8 @@ export interface components {
              * @default 0.1
              */
             mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
+            mass_g?: number;
             /**
              * @description Maximum number of time steps
              * @default 100
@@ -1809,6 +1811,35 @@ export interface components {
              */
             z?: number | null;
         };
+        /** @description The change of a figure from an earlier to a later scan. */
+        FigureChange: {
+            /**
+             * Format: double
+             * @description The later figure less the earlier one.
+             */
+            change: number;
+            /**
+             * Format: int64
+             * @description The earlier scan.
+             */
+            earlier: number;
+            /** @description The figure: its name in `scans`. */
+            figure: string;
+            /** @description The 95 % interval of the change. */
+            interval: number[];
+            /**
+             * Format: int64
+             * @description The later one.
+             */
+            later: number;
+            /**
+             * Format: double
+             * @description The least change that nine of ten such pairs of scans would show.
+             */
+            least_change: number;
+            /** @description Whether it changed. */
+            verdict: components["schemas"]["Verdict"];
+        };
         /** @description The mean of a figure over a segment. */
         FigureSegment: {
             /**
@@ -2344,6 +2375,8 @@ export interface components {
             revision: number;
             /** @description The segmentation it made; only for kind `segmentation`. */
             segmentation?: string | null;
+            /** @description The serial comparison it made; only for kind `serial`. */
+            serial?: string | null;
             source?: components["schemas"]["JobSource"] | null;
             /**
              * @description The stage of the work, after the first one has begun.
@@ -2382,6 +2415,8 @@ export interface components {
             segmentation?: string | null;
             /** @description This job. */
             self: string;
+            /** @description The serial comparison it made. */
+            serial?: string | null;
             /** @description Its volume, once it is stored. */
             volume?: string | null;
         };
@@ -2392,8 +2427,8 @@ export interface components {
             /** @description `cursor` of the next page; absent on the last. */
             next_cursor?: string | null;
         };
-        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["NormalsParameters"];
-        JobRequest: components["schemas"]["ModelJobRequest"] | components["schemas"]["SegmentationJobRequest"] | components["schemas"]["BeatJobRequest"] | components["schemas"]["ComparisonJobRequest"] | components["schemas"]["NormalsJobRequest"];
+        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["SerialParameters"] | components["schemas"]["NormalsParameters"];
+        JobRequest: components["schemas"]["ModelJobRequest"] | components["schemas"]["SegmentationJobRequest"] | components["schemas"]["BeatJobRequest"] | components["schemas"]["ComparisonJobRequest"] | components["schemas"]["SerialJobRequest"] | components["schemas"]["NormalsJobRequest"];
         /** @description A series in an archive. */
         JobSource: {
             /** @description The archive's name. */
@@ -3364,6 +3399,8 @@ export interface components {
              * @default 0.1
              */
             mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
+            mass_g?: number;
             /**
              * @description Maximum number of time steps
              * @default 100
@@ -3599,6 +3636,8 @@ export interface components {
              * @default 0.1
              */
             mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
+            mass_g?: number;
             /**
              * @description Maximum number of time steps
              * @default 100
@@ -4929,6 +4968,8 @@ export interface components {
              * @default 0.1
              */
             mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
+            mass_g?: number;
             /**
              * @description Maximum number of time steps
              * @default 100
@@ -5157,6 +5198,630 @@ export interface components {
             volumes_ml: components["schemas"]["FittedVolumes"];
         };
         /**
+         * @description A serial comparison: scans of one patient, fitted from one common heart, with the main figures. Its volume is the
+         *     first scan of the request, its parameter `others` the others.
+         */
+        Serial: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example ser_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["SerialLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["SerialParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description What changed from the first to the last scan, and flags; the report has all figures. */
+            summary: components["schemas"]["SerialSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        SerialFileName: ("mesh_scan01.glb" | "mesh_scan01.gltf" | "mesh_scan01.stl" | "mesh_scan01.ply" | "mesh_scan01.obj" | "mesh_scan01.vtp" | "mesh_scan01.vtk" | "mesh_scan01.json" | "serial.json" | "report.html" | "trend.svg" | "figures.csv" | "changes.csv" | "segments.csv") | string;
+        SerialJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "serial";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["SerialParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            source?: components["schemas"]["SourceRequest"];
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description Paths of one serial comparison. */
+        SerialLinks: {
+            /** @description The wall in the first scan, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
+            /** @description The report. */
+            report: string;
+            /** @description This serial comparison. */
+            self: string;
+            /** @description The figures of all scans, drawn. */
+            trend: string;
+            /** @description The volumes, in the order of the request. */
+            volumes: string[];
+        };
+        /** @description A page of serials. */
+        SerialList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The serials, newest first. */
+            serials: components["schemas"]["Serial"][];
+        };
+        /**
+         * @description The change of the wall's uptake from an earlier to a later scan. Uptake is in per cent of the earlier scan's reference,
+         *     the later one scaled to it by the wall that did not change.
+         */
+        SerialPair: {
+            /** @description Its interval. */
+            better_interval_percent: number[];
+            /**
+             * Format: double
+             * @description Share of the wall that gained uptake.
+             */
+            better_percent: number;
+            /** @description Whether wall gained uptake. */
+            better_verdict: components["schemas"]["Verdict"];
+            /**
+             * Format: double
+             * @description Share of the wall with muscle in both scans.
+             */
+            compared_percent: number;
+            /**
+             * Format: double
+             * @description Correlation of both maps.
+             */
+            correlation: number;
+            /**
+             * Format: double
+             * @description Share of the wall below the threshold in both scans.
+             */
+            dark_in_both_percent: number;
+            /**
+             * Format: double
+             * @description The least loss, per cent, that is found in nine of ten such pairs if it takes up a territory.
+             */
+            detectable_percent: number;
+            /**
+             * Format: int64
+             * @description The earlier scan.
+             */
+            earlier: number;
+            /**
+             * Format: int64
+             * @description The later one.
+             */
+            later: number;
+            /**
+             * Format: double
+             * @description What the later scan lacks in the regions that lost uptake, per cent of the whole wall's uptake.
+             */
+            lost_percent: number;
+            /**
+             * Format: double
+             * @description Share of the wall by which the later scan was scaled.
+             */
+            matched_percent: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the smoothed difference by the noise of this pair, points.
+             */
+            noise_points: number;
+            /**
+             * Format: double
+             * @description Counts of the later scan that are one count of the earlier one where nothing changed.
+             */
+            scale: number;
+            /** @description The 17 segments. */
+            segments: components["schemas"]["SerialSegment"][];
+            /** @description Its interval by noise: 5th and 95th percentile. */
+            worse_interval_percent: number[];
+            /**
+             * Format: double
+             * @description Share of the wall that lost uptake, each region as far as half of the depth of its loss.
+             */
+            worse_percent: number;
+            /** @description Whether wall lost uptake. */
+            worse_verdict: components["schemas"]["Verdict"];
+        };
+        /** @description The parameters of a serial comparison */
+        SerialParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /**
+             * @description Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: what a DICOM header says
+             * @enum {string}
+             */
+            attenuation_corrected?: "yes" | "no";
+            /**
+             * @description How far the axis of rotation lies from the middle of the frames towards higher columns, mm
+             * @default 0
+             */
+            axis_offset_mm?: number;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /**
+             * @description Whether views of projections in which the heart lies elsewhere are shifted back, and slices and fit are made again. Reports state the motion and both results
+             * @default false
+             */
+            correct_motion?: boolean;
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Wall of a ventricle that mask, mesh and measures show: apparent (as the blurred image shows it) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @default apparent
+             * @enum {string}
+             */
+            edge?: "apparent" | "anatomical";
+            /** @description Number of the energy window that is reconstructed, from 1. Default: that with the photopeak of the radionuclide */
+            energy_window?: number;
+            /**
+             * @description What keeps noise out of the image: butterworth, gaussian or none
+             * @default butterworth
+             * @enum {string}
+             */
+            filter?: "butterworth" | "gaussian" | "none";
+            /**
+             * @description Frequency of which the Butterworth filter leaves 71 %, cycles per cm
+             * @default 0.5
+             */
+            filter_cut_off_per_cm?: number;
+            /**
+             * @description Width of the Gaussian filter at half of its maximum, mm
+             * @default 10
+             */
+            filter_fwhm_mm?: number;
+            /**
+             * @description Order n of the Butterworth filter, which leaves 1 / sqrt(1 + (f / cut-off)^2n) of a frequency f
+             * @default 5
+             */
+            filter_order?: number;
+            /**
+             * @description Whether the volumes of all files are gates of one heart beat although their headers say otherwise
+             * @default false
+             */
+            gated?: boolean;
+            /**
+             * @description Name (as in a report) of the fitted model to keep: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @example built-in usual
+             */
+            kept_model?: string;
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known, as by magnetic resonance: the image hardly tells how thick a wall is. Default: by the wall's width, with the interval that it leaves */
+            mass_g?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Id of the model to fit (a template, a model or an earlier segmentation), or auto: fits the built-in hearts, the templates flagged `library` and the models named after it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative name: template
+             * @default auto
+             */
+            model?: string;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /** @description Id of normal limits to compare the wall's uptake with */
+            normals?: string;
+            /**
+             * @description Arc of the camera's rotation, degrees: 180, 360, or none (a stationary camera: motion does not show in the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
+            /**
+             * @description Iterations of OSEM over all subsets; more sharpen the image and its noise
+             * @default 3
+             */
+            osem_iterations?: number;
+            /**
+             * @description Subsets of OSEM: the greatest number up to it that divides the number of views is taken, unless that is less than half of it
+             * @default 10
+             */
+            osem_subsets?: number;
+            /** @description Ids of the volumes of the patient's other scans, separated by commas */
+            others?: string;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 3
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description The scan's protocol, as the normal limits name it. Default: the only one that they have
+             * @example rest
+             */
+            protocol?: string;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /**
+             * @description How the image is made: osem (ordered subsets expectation maximisation) or fbp (filtered back projection)
+             * @default osem
+             * @enum {string}
+             */
+            reconstruction?: "osem" | "fbp";
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres (ventriform resolution learns it from scans of a protocol). It tells how much of a wall's thickness is blur. Default: by the image's noise, less certain */
+            resolution?: number;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /**
+             * @description Whether all scans are of one patient although their headers name several, as after pseudonymisation
+             * @default false
+             */
+            same_patient?: boolean;
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header
+             * @enum {string}
+             */
+            sex?: "F" | "M";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+            /**
+             * @description The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have
+             * @example Tc-99m tetrofosmin
+             */
+            tracer?: string;
+        };
+        /** @description The report of a serial comparison: scans of one patient, and what changed from scan to scan. */
+        SerialReport: {
+            /** @description The change of every figure: of every scan against the first one, and then against the one before it. */
+            changes: components["schemas"]["FigureChange"][];
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /** @description Whether all scans are gated, so that there are beats. */
+            gated: boolean;
+            /** @description The change of the wall's uptake, likewise. */
+            pairs: components["schemas"]["SerialPair"][];
+            /** @description Every parameter, defaults written out. */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** @description The scans, in the order of their dates. */
+            scans: components["schemas"]["SerialScan"][];
+        };
+        SerialRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            /** @description Normal limits by which all scans are scored */
+            normals?: string;
+            parameters?: components["schemas"]["SerialParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description The scans, in any order: volumes, or the segmentations or beats of them */
+            scans: string[];
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description A scan of a series. All are fitted from one common heart. */
+        SerialScan: {
+            /**
+             * Format: double
+             * @description Beats a minute; `null` unless the scan is gated and its R-R interval is known.
+             */
+            beats_per_minute?: number | null;
+            /**
+             * Format: double
+             * @description Volume of the cavity in the image of all gates.
+             */
+            cavity_ml?: number | null;
+            /**
+             * Format: double
+             * @description Confidence of the fit of this scan alone, 0..=1.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description Correlation of the image with that of the first scan about the wall.
+             */
+            correlation: number;
+            /**
+             * Format: double
+             * @description Share of the wall below the threshold, a share of the scan's own maximum.
+             */
+            dark_percent?: number | null;
+            /** @description The date, `YYYY-MM-DD`; `null` where the header states none. */
+            date?: string | null;
+            /**
+             * Format: double
+             * @description Deficit score.
+             */
+            deficit_percent?: number | null;
+            /**
+             * Format: double
+             * @description End-diastolic volume.
+             */
+            edv_ml?: number | null;
+            /**
+             * Format: double
+             * @description Ejection fraction, per cent; `null` unless all scans are gated, as for the others of the beat.
+             */
+            ef_percent?: number | null;
+            /**
+             * Format: double
+             * @description End-systolic volume.
+             */
+            esv_ml?: number | null;
+            /**
+             * Format: double
+             * @description Share of the wall below the normal limit; `null` without normal limits, as for the other two.
+             */
+            extent_percent?: number | null;
+            /**
+             * Format: int64
+             * @description Its number as it was given.
+             */
+            given: number;
+            /** @description The file. */
+            input: components["schemas"]["FileFacts"];
+            /**
+             * Format: double
+             * @description Mass of the muscle by the fit of this scan alone; the volumes of all scans stand on one common mass.
+             */
+            mass_g?: number | null;
+            /**
+             * Format: double
+             * @description Inward motion, the mean of the segments.
+             */
+            motion_mm?: number | null;
+            /**
+             * Format: double
+             * @description How far the heart lies from where it was in the first scan, mm.
+             */
+            moved_mm: number;
+            /**
+             * Format: int64
+             * @description Its number.
+             */
+            number: number;
+            /**
+             * Format: double
+             * @description Bandwidth of the phases.
+             */
+            phase_bandwidth_degrees?: number | null;
+            /**
+             * Format: double
+             * @description Standard deviation of the phases; `null` where they are not reliable.
+             */
+            phase_sd_degrees?: number | null;
+            polar?: components["schemas"]["PolarSummary"] | null;
+            resolution_mm?: components["schemas"]["Resolution"] | null;
+            /** @description Series Description, if the header has one. */
+            series_description?: string | null;
+            /**
+             * Format: double
+             * @description Summed score, 0 to 68.
+             */
+            summed_score?: number | null;
+            /** @description The model that was fitted. */
+            template: string;
+            /**
+             * Format: double
+             * @description Thickening, the mean of the segments.
+             */
+            thickening_percent?: number | null;
+            /**
+             * Format: double
+             * @description By how much it is turned against the first scan, degrees.
+             */
+            turned_degrees: number;
+            /** @description Warnings about the file. */
+            warnings: string[];
+        };
+        /** @description The change of a segment from an earlier to a later scan. */
+        SerialSegment: {
+            /** @description Its 95 % interval. */
+            change_interval_points?: number[] | null;
+            /**
+             * Format: double
+             * @description The later less the earlier, points.
+             */
+            change_points?: number | null;
+            change_verdict?: components["schemas"]["Verdict"] | null;
+            /**
+             * Format: double
+             * @description Its mean uptake in the earlier scan; `null` where nothing can be compared, as for the others.
+             */
+            earlier_percent?: number | null;
+            /**
+             * Format: double
+             * @description In the later one.
+             */
+            later_percent?: number | null;
+            /**
+             * Format: double
+             * @description Change of the inward motion, mm; `null` unless all scans are gated.
+             */
+            motion_change_mm?: number | null;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int64
+             * @description Its number, 1 to 17.
+             */
+            segment: number;
+            /**
+             * Format: double
+             * @description Change of the thickening, points.
+             */
+            thickening_change_points?: number | null;
+        };
+        /** @description The main figures of a serial comparison, of its last scan against the first one; the report has all. */
+        SerialSummary: {
+            /**
+             * Format: double
+             * @description Share of the wall that gained uptake.
+             */
+            better_percent: number;
+            /** @description Whether wall gained uptake. */
+            better_verdict: components["schemas"]["Verdict"];
+            /**
+             * Format: double
+             * @description The least confidence of the fits, 0 to 1.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description Change of the ejection fraction, points; `null` unless all scans are gated.
+             */
+            ef_change_points?: number | null;
+            ef_change_verdict?: components["schemas"]["Verdict"] | null;
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /**
+             * Format: int64
+             * @description Number of scans.
+             */
+            scans: number;
+            /**
+             * Format: double
+             * @description Share of the wall that lost uptake.
+             */
+            worse_percent: number;
+            /** @description Whether wall lost uptake. */
+            worse_verdict: components["schemas"]["Verdict"];
+        };
+        /**
          * @description A patient's sex, as the scan's header has it.
          * @enum {string}
          */
@@ -5199,7 +5864,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation" | "beat" | "comparison" | "normals";
+            kind?: "model" | "segmentation" | "beat" | "comparison" | "serial" | "normals";
             /**
              * @description The caller's own names and values
              * @example {
@@ -5970,7 +6635,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation" | "beat" | "comparison" | "normals";
+            kind?: "model" | "segmentation" | "beat" | "comparison" | "serial" | "normals";
             /**
              * @description The caller's own names and values
              * @example {
@@ -6155,6 +6820,7 @@ export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
 export type ExcludedCase = components['schemas']['ExcludedCase'];
 export type FigureBeside = components['schemas']['FigureBeside'];
+export type FigureChange = components['schemas']['FigureChange'];
 export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
 export type Fit = components['schemas']['Fit'];
@@ -6278,6 +6944,18 @@ export type SegmentationList = components['schemas']['SegmentationList'];
 export type SegmentationParameters = components['schemas']['SegmentationParameters'];
 export type SegmentationReport = components['schemas']['SegmentationReport'];
 export type SegmentationSummary = components['schemas']['SegmentationSummary'];
+export type Serial = components['schemas']['Serial'];
+export type SerialFileName = components['schemas']['SerialFileName'];
+export type SerialJobRequest = components['schemas']['SerialJobRequest'];
+export type SerialLinks = components['schemas']['SerialLinks'];
+export type SerialList = components['schemas']['SerialList'];
+export type SerialPair = components['schemas']['SerialPair'];
+export type SerialParameters = components['schemas']['SerialParameters'];
+export type SerialReport = components['schemas']['SerialReport'];
+export type SerialRequest = components['schemas']['SerialRequest'];
+export type SerialScan = components['schemas']['SerialScan'];
+export type SerialSegment = components['schemas']['SerialSegment'];
+export type SerialSummary = components['schemas']['SerialSummary'];
 export type Sex = components['schemas']['Sex'];
 export type Shape = components['schemas']['Shape'];
 export type Smoothness = components['schemas']['Smoothness'];

@@ -1,7 +1,7 @@
 //! Schemas of request bodies that several structs make up, or that the library reads.
 
 use crate::wire::job_fields::{
-    CohortFields, ComparisonFields, JobFields, OrderFields, external_id, labels,
+    CohortFields, ComparisonFields, JobFields, OrderFields, SerialFields, external_id, labels,
 };
 use serde_json::json;
 use std::borrow::Cow;
@@ -14,7 +14,7 @@ use utoipa::{PartialSchema, ToSchema};
 use ventriform::heart::normals::{NormalLimits, Sex};
 use ventriform::parameters::{
     CohortCase, ComparisonParameters, FitParameters, GatedParameters, ModelParameters,
-    NormalsParameters,
+    NormalsParameters, SerialParameters,
 };
 use ventriform_service::base::records::Resource;
 use ventriform_service::work::dicom;
@@ -55,6 +55,7 @@ schemas! {
             add::<FitParameters>,
             add::<GatedParameters>,
             add::<ComparisonParameters>,
+            add::<SerialParameters>,
             add::<NormalsJobParameters>,
             add::<JobParameters>,
             add::<CohortCase>,
@@ -85,6 +86,12 @@ schemas! {
     ComparisonRequest, |schemas| { JobRequest::schemas(schemas) } => {
         let mut object = joined([OrderFields::schema(), ComparisonFields::schema()]);
         add_send_fields(&mut object, &[Resource::Comparison]);
+        object
+    };
+    /// A serial comparison to be made.
+    SerialRequest, |schemas| { JobRequest::schemas(schemas) } => {
+        let mut object = joined([OrderFields::schema(), SerialFields::schema()]);
+        add_send_fields(&mut object, &[Resource::Serial]);
         object
     };
     /// Normal limits to be added or built.
@@ -210,7 +217,7 @@ struct JobKind {
 }
 
 /// The kinds; a job that names none is of the first.
-const JOB_KINDS: [JobKind; 5] = [
+const JOB_KINDS: [JobKind; 6] = [
     JobKind {
         kind: "model",
         request: "ModelJobRequest",
@@ -234,6 +241,12 @@ const JOB_KINDS: [JobKind; 5] = [
         request: "ComparisonJobRequest",
         parameters: ComparisonParameters::name,
         result: Resource::Comparison,
+    },
+    JobKind {
+        kind: "serial",
+        request: "SerialJobRequest",
+        parameters: SerialParameters::name,
+        result: Resource::Serial,
     },
     JobKind {
         kind: "normals",

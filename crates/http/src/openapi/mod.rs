@@ -26,17 +26,18 @@ mod operation;
 mod result_files;
 mod share;
 mod walk;
+mod written;
 
 pub use answers::{
     BeatAnswer, ComparisonAnswer, DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer,
     FileAnswer, FileProblems, HoldProblems, IdentityProblems, ListProblems, LookupProblems,
     MeshAnswer, OriginalAnswer, PatchProblems, ReportAnswer, ReportDocumentAnswer,
-    ScanErasureProblems, ScopeProblems, SegmentationAnswer, StowAnswers, UnchangedAnswer,
-    UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
+    ScanErasureProblems, ScopeProblems, SegmentationAnswer, SerialAnswer, StowAnswers,
+    UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
     ComparisonForm, ComparisonRequest, DicomJson, JobParameters, JobRequest, MeshDocument,
-    NormalsRequest, SegmentationForm, StatedScanSchema, TagsPatch, UploadForm,
+    NormalsRequest, SegmentationForm, SerialRequest, StatedScanSchema, TagsPatch, UploadForm,
 };
 pub use inputs::{
     BeatQuery, CachedHeaders, ComparisonQuery, ConditionalHeaders, ErasureHeader, EventHeader,
@@ -44,6 +45,7 @@ pub use inputs::{
     WebhookSecretHeader, fit_parameters,
 };
 pub use operation::Documented;
+pub use written::written;
 
 use utoipa::OpenApi;
 use utoipa::openapi::{RefOr, Required};
@@ -67,6 +69,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "beats", description = "Gated studies as one model in motion, and one request from study to beat"),
         (name = "comparisons", description = "Rest and stress of one patient"),
+        (name = "serials", description = "One patient over the years: several scans, compared"),
         (name = "normals", description = "Normal limits: the uptake of healthy people, which segmentations, beats and \
             comparisons are scored by"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
@@ -87,6 +90,7 @@ use utoipa::openapi::{RefOr, Required};
         ventriform::results::report::SegmentationReport,
         ventriform::results::report::BeatReport,
         ventriform::results::report::ComparisonReport,
+        ventriform::results::report::SerialReport,
         ventriform::heart::normals::NormalLimits,
         ventriform::heart::polar::PolarDocument,
         ventriform::heart::polar::FigureDocument,

@@ -4,7 +4,7 @@
 //! has
 //!
 //! 1. `x-files`: of every name what the file is, when it exists, its media type, its schema, and the query parameters
-//!    that it takes. `NN` in a name stands for the number of a gate, counted from 01.
+//!    that it takes. `NN` in a name stands for the number of a gate or of a scan, counted from 01.
 //! 2. In its answer 200 every media type, with the schemas that are sent under it. Bytes come first: generators of
 //!    clients read an answer by its first media type, and all files can be read as bytes.
 
@@ -39,6 +39,8 @@ const WITH_STORED_SCAN: &str =
 const STORED_VENTRICLES: &str = "made on request of a left ventricle, while the volume is stored and it is known whose scan it is";
 const PAGE: &str = "The report as an HTML page, made on request; it names patient, study and series as far as the key may see them";
 const GATE: &str = "of every gate";
+const SCAN: &str = "of every scan";
+const PAIR: &str = "of every scan with the first one, and with the one before it";
 
 const MODEL_FILES: &[FileRow] = &[
     row("mesh.*", "The surface", ALWAYS),
@@ -309,6 +311,44 @@ const COMPARISON_FILES: &[FileRow] = &[
     ),
 ];
 
+const SERIAL_FILES: &[FileRow] = &[
+    row("serial.json", "The report", ALWAYS),
+    row(
+        REPORT_PAGE,
+        "The report as an HTML page, made on request; it names patient, study and series of the first scan, and the dates of all, as far as the key may see them",
+        ALWAYS,
+    ),
+    row("trend.svg", "The figures of all scans, drawn", ALWAYS),
+    row("figures.csv", "The figures of all scans", ALWAYS),
+    row("changes.csv", "What changed between scans", ALWAYS),
+    row(
+        "segments.csv",
+        "The segments in every pair of scans",
+        ALWAYS,
+    ),
+    row("mesh_scan01.*", "The wall in the first scan", ALWAYS),
+    row("mesh_scanNN.*", "The wall in scan NN", SCAN),
+    row(
+        "polar_scanNN.svg",
+        "The polar map of uptake in scan NN, drawn",
+        SCAN,
+    ),
+    row("polar_scanNN.png", "The same as pixels", SCAN),
+    row("polar_scanNN.json", "The same as numbers", SCAN),
+    row(
+        "region_scanNN.nii.gz",
+        "The image about the heart in scan NN, in 256 steps",
+        SCAN,
+    ),
+    row(
+        "polar_change_NN_NN.svg",
+        "The polar map of the change between two scans, earlier less later, drawn",
+        PAIR,
+    ),
+    row("polar_change_NN_NN.png", "The same as pixels", PAIR),
+    row("polar_change_NN_NN.json", "The same as numbers", PAIR),
+];
+
 const NORMALS_FILES: &[FileRow] = &[row(
     "normals.json",
     "The limits, as `ventriform segment --normals` takes them",
@@ -330,6 +370,7 @@ fn rows_of(folder: &str) -> &'static [FileRow] {
         "segmentations" => SEGMENTATION_FILES,
         "beats" => BEAT_FILES,
         "comparisons" => COMPARISON_FILES,
+        "serials" => SERIAL_FILES,
         "normals" => NORMALS_FILES,
         "readers" => READER_FILES,
         "templates" => TEMPLATE_FILES,
@@ -484,13 +525,14 @@ fn media_type_of(name: &str) -> &'static str {
 /// The schema of a product's file.
 fn schema_of(folder: &str, name: &str) -> Value {
     match (name, media_type_of(name)) {
-        ("report.json" | "beat.json" | "comparison.json", _) => report_of(folder),
+        ("report.json" | "beat.json" | "comparison.json" | "serial.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
         (
             "polar.json" | "polar_ed.json" | "polar_es.json" | "polar_stress.json"
             | "polar_rest.json",
             _,
         ) => reference("PolarMap"),
+        (map, "application/json") if map.starts_with("polar_scan") => reference("PolarMap"),
         (figure, "application/json") if figure.starts_with("polar_") => reference("PolarFigure"),
         ("normals.json", _) => reference("NormalLimits"),
         ("profile.json", _) => reference("ReaderProfile"),
@@ -514,6 +556,8 @@ pub fn report_of(path: &str) -> Value {
         reference("BeatReport")
     } else if path.starts_with("/v1/comparisons") {
         reference("ComparisonReport")
+    } else if path.starts_with("/v1/serials") {
+        reference("SerialReport")
     } else {
         reference("ModelReport")
     }

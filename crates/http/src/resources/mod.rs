@@ -16,6 +16,7 @@ pub(crate) mod scan_erasures;
 pub(crate) mod scan_search;
 pub(crate) mod scans;
 pub(crate) mod segmentations;
+pub(crate) mod serials;
 pub(crate) mod tags;
 pub(crate) mod templates;
 pub(crate) mod volume_download;

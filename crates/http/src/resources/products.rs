@@ -611,12 +611,18 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison then the one at rest.
+    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison then the one at rest, of a
+    /// serial comparison then all others.
     async fn sees(self, app: &App, product: &Product) -> Answer<Vec<Map<String, Value>>> {
-        let rest = product.parameters.get(REST_FIELD).and_then(Value::as_str);
-        let rest = rest.filter(|_| product.resource() == Resource::Comparison);
+        let field = match product.resource() {
+            Resource::Comparison => Some(REST_FIELD),
+            Resource::Serial => Some(OTHERS_FIELD),
+            _ => None,
+        };
+        let others = field.and_then(|field| product.parameters.get(field)?.as_str());
+        let others = others.into_iter().flat_map(|ids| ids.split(','));
         let mut scans = Vec::new();
-        for volume in product.volume.as_deref().into_iter().chain(rest) {
+        for volume in product.volume.as_deref().into_iter().chain(others) {
             let scan = match self.deidentify {
                 true => None,
                 false => app.service.scan(self.tenant, volume).await?,
@@ -649,6 +655,8 @@ async fn send_named(
 
 /// The parameter of a comparison that names the volume at rest.
 const REST_FIELD: &str = "rest";
+/// The parameter of a serial comparison that names the other volumes.
+const OTHERS_FIELD: &str = "others";
 
 /// Whether a product of that kind may have a mesh of this name.
 fn is_mesh<P: ProductCollection>(name: &str) -> bool {

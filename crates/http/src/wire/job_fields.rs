@@ -11,7 +11,9 @@ use std::collections::BTreeMap;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::{PartialSchema, ToSchema};
-use ventriform::parameters::{CohortCase, ComparisonParameters, NormalsParameters};
+use ventriform::parameters::{
+    CohortCase, ComparisonParameters, NormalsParameters, SerialParameters,
+};
 use ventriform_service::base::records::Priority;
 use ventriform_service::work::MOST_CASES;
 
@@ -139,6 +141,23 @@ pub struct ComparisonFields {
     pub normals: Option<String>,
     #[serde(default)]
     #[schema(value_type = ComparisonParameters, required = false)]
+    pub parameters: Map<String, Value>,
+}
+
+/// The scans of a serial comparison, and how they are compared.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SerialFields {
+    /// The scans, in any order: volumes, or the segmentations or beats of them
+    #[serde(default, deserialize_with = "given")]
+    #[schema(required = true, nullable = false, min_items = 2, max_items = 20)]
+    pub scans: Option<Vec<String>>,
+    /// Normal limits by which all scans are scored
+    #[serde(default, deserialize_with = "given")]
+    #[schema(nullable = false, pattern = "^(nrm_)[0-9a-f]{1,64}$")]
+    pub normals: Option<String>,
+    #[serde(default)]
+    #[schema(value_type = SerialParameters, required = false)]
     pub parameters: Map<String, Value>,
 }
 

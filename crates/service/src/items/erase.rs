@@ -33,7 +33,7 @@ pub(super) type Doomed = BTreeMap<String, Vec<FileRecord>>;
 pub struct RetentionAges {
     /// Of volumes, counted from their last upload or use.
     pub volumes: Option<Duration>,
-    /// Of models, segmentations, beats and comparisons, counted from when they were last computed.
+    /// Of models, segmentations, beats, comparisons and serial comparisons, counted from when they were last computed.
     pub results: Option<Duration>,
     /// Of the records of finished jobs, counted from their end.
     pub jobs: Option<Duration>,
@@ -51,9 +51,11 @@ impl RetentionAges {
     pub(crate) fn age(&self, kind: Resource) -> Option<Duration> {
         match kind {
             Resource::Volume => self.volumes,
-            Resource::Model | Resource::Segmentation | Resource::Beat | Resource::Comparison => {
-                self.results
-            }
+            Resource::Model
+            | Resource::Segmentation
+            | Resource::Beat
+            | Resource::Comparison
+            | Resource::Serial => self.results,
             Resource::Job => self.jobs,
             Resource::Template | Resource::Reader | Resource::Normals => None,
         }

@@ -6,6 +6,7 @@
 //! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
 //! | `beat` | jobs of kind `beat`: one wall in motion fitted to the gates of a volume |
 //! | `comparison` | jobs of kind `comparison`: rest and stress of one patient |
+//! | `serial` | jobs of kind `serial`: scans of one patient over the years |
 //! | `normals` | jobs of kind `normals`: normal limits of a cohort of stored volumes |
 //! | `models` | the models that jobs fit |
 //! | `limits` | normal limits, as uploaded and as jobs need them |
@@ -33,6 +34,7 @@ mod parameters;
 pub mod part;
 mod profile;
 mod segmentation;
+mod serial;
 mod template;
 mod upload;
 
@@ -42,6 +44,7 @@ pub use model::ModelWork;
 pub use normals::{MOST_CASES, NormalsWork, first_volume};
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
+pub use serial::SerialWork;
 pub use template::TEMPLATE_BYTES;
 pub use upload::{
     DomainReader, INSPECTION_MEMORY, IntensityFacts, UploadFacts, UploadReader, preview_memory,
@@ -66,11 +69,12 @@ pub struct Engine {
 impl Engine {
     /// The engine of the product; `limits` bound the volumes it reads.
     pub fn new(limits: ReadLimits) -> Self {
-        let works: [Arc<dyn Work>; 5] = [
+        let works: [Arc<dyn Work>; 6] = [
             Arc::new(ModelWork { limits }),
             Arc::new(SegmentationWork { limits }),
             Arc::new(BeatWork { limits }),
             Arc::new(ComparisonWork { limits }),
+            Arc::new(SerialWork { limits }),
             Arc::new(NormalsWork { limits }),
         ];
         Self {

@@ -1,4 +1,4 @@
-//! HTML pages of stored models, segmentations, beats and comparisons.
+//! HTML pages of stored models, segmentations, beats, comparisons and serial comparisons.
 //!
 //! A page consists mostly of pictures: it is ten times as large as the other files together and
 //! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
@@ -8,12 +8,14 @@
 
 use serde_json::{Map, Value};
 use std::io;
+use std::sync::LazyLock;
 use ventriform::image::volume::Provenance;
 use ventriform::results::export::read_json::{self, ReadMeshError};
 use ventriform::results::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
-    SegmentationPage, SegmentationReport,
+    SegmentationPage, SegmentationReport, SerialPage, SerialReport,
 };
+use ventriform::runs::serial;
 
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
@@ -81,6 +83,15 @@ pub(super) const COMPARISON_FILES: &[&str] = &[
     ComparisonPage::POLAR_MAPS[5].0,
     ComparisonPage::POLAR_MAPS[6].0,
 ];
+
+/// The files that [`serial_page`] reads: report and trend, the polar map of every scan that there may be, and the maps of
+/// the changes from the first scan and from scan to scan.
+pub(super) fn serial_files() -> &'static [&'static str] {
+    static NAMES: LazyLock<Vec<String>> = LazyLock::new(serial::page_files);
+    static FILES: LazyLock<Vec<&'static str>> =
+        LazyLock::new(|| NAMES.iter().map(String::as_str).collect());
+    &FILES
+}
 
 /// The wall at end diastole and at end systole.
 const END_MESHES: [&str; 2] = ["mesh_ed.json", "mesh_es.json"];
@@ -195,6 +206,38 @@ pub(super) fn comparison_page(
         slices: slices.as_deref(),
         maps: &borrowed(&maps),
         scan: Some(&scans[0]),
+    }))
+}
+
+/// The page of a serial comparison, made of `serial.json` and those of [`serial_files`] that exist.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn serial_page(
+    read: &ReadFile<'_>,
+    scans: &[Map<String, Value>],
+) -> Result<String, PageError> {
+    let report: SerialReport = from_json("serial.json", &required(read, "serial.json")?)?;
+    let scans: Vec<_> = scans.iter().map(provenance).collect();
+    let report = report.with_scans(&scans);
+    let trend = optional(read, "trend.svg")?;
+    let mut maps = Vec::new();
+    for name in serial_files() {
+        maps.extend(optional(read, name)?.map(|svg| (*name, svg)));
+    }
+    let content = |name: &str| {
+        let found = maps.iter().find(|(known, _)| *known == name);
+        found.map(|(_, svg)| svg.as_slice())
+    };
+    let first = report
+        .scans
+        .first()
+        .and_then(|scan| scans.get(scan.given - 1));
+    Ok(report::serial_page(&SerialPage {
+        report: &report,
+        trend: trend.as_deref(),
+        maps: &serial::maps_of(&report, content),
+        scan: first,
     }))
 }
 

@@ -645,8 +645,16 @@ pub(crate) async fn insert_content(to: &mut Transaction<'_>, product: &Product) 
     Ok(())
 }
 
-/// The parameters that name further volumes which a product is made of.
-pub(super) const OTHER_VOLUMES: [&str; 2] = ["expert", "rest"];
+/// The parameters that name further volumes which a product is made of, one or several separated by commas.
+const OTHER_VOLUMES: [&str; 3] = ["expert", "rest", "others"];
+
+/// The volumes that a product is made of.
+pub(super) fn volumes_of(product: &Product) -> impl Iterator<Item = &str> {
+    let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
+    let others = others.into_iter().flatten().flat_map(|ids| ids.split(','));
+    let others = others.filter(|id| Resource::from_id(id) == Some(Resource::Volume));
+    product.volume.as_deref().into_iter().chain(others)
+}
 
 /// Adds a product within a transaction, unless it is stored already, and gives it to a tenant.
 /// Returns whether it is new for the tenant.
@@ -658,10 +666,7 @@ pub(super) async fn insert_product(
     insert_content(to, product).await?;
     let tags = Tags::default();
     let new = hold(to, tenant, &product.id, &tags, product.created_at).await?;
-    let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
-    let others = others.into_iter().flatten();
-    let others = others.filter(|id| Resource::from_id(id) == Some(Resource::Volume));
-    for volume in product.volume.as_deref().into_iter().chain(others) {
+    for volume in volumes_of(product) {
         add_source(to, tenant, &product.id, volume).await?;
     }
     Ok(new)

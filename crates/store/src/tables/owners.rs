@@ -5,7 +5,7 @@
 //! is: such a hold is lifted as any other, by name.
 
 use super::access::append;
-use super::catalogue::{OTHER_VOLUMES, insert_content};
+use super::catalogue::{insert_content, volumes_of};
 use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::query;
@@ -320,10 +320,7 @@ async fn insert_volume(to: &mut Transaction<'_>, volume: &StoredVolume) -> Store
 
 /// Notes what a product was made of, for everybody who has it.
 async fn note_sources(to: &mut Transaction<'_>, product: &Product) -> StoreResult<()> {
-    let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
-    let others = others.into_iter().flatten();
-    let others = others.filter(|id| Resource::from_id(id) == Some(Resource::Volume));
-    for volume in product.volume.as_deref().into_iter().chain(others) {
+    for volume in volumes_of(product) {
         query(
             "INSERT INTO sources (tenant, id, volume)
              SELECT tenant, id, CAST($2 AS TEXT) FROM holdings WHERE id = $1 ON CONFLICT DO NOTHING",

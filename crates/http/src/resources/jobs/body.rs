@@ -82,6 +82,8 @@ pub struct JobBody {
     beat: Option<String>,
     /// The comparison it made; only for kind `comparison`.
     comparison: Option<String>,
+    /// The serial comparison it made; only for kind `serial`.
+    serial: Option<String>,
     /// The normal limits it built; only for kind `normals`.
     normals: Option<String>,
     /// Related paths.
@@ -233,6 +235,9 @@ struct JobLinks {
     /// The comparison it made.
     #[serde(skip_serializing_if = "Option::is_none")]
     comparison: Option<String>,
+    /// The serial comparison it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    serial: Option<String>,
     /// The normal limits it built.
     #[serde(skip_serializing_if = "Option::is_none")]
     normals: Option<String>,
@@ -269,7 +274,7 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
     };
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
     let (beat, comparison) = (made(Resource::Beat), made(Resource::Comparison));
-    let normals = made(Resource::Normals);
+    let (serial, normals) = (made(Resource::Serial), made(Resource::Normals));
     // Limits have neither mesh nor report.
     let shown = normals.is_none();
     let result = job.result.as_deref().map(path_of);
@@ -302,6 +307,7 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
             beat: beat.as_deref().map(path_of),
             mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
             comparison: comparison.as_deref().map(path_of),
+            serial: serial.as_deref().map(path_of),
             normals: normals.as_deref().map(path_of),
             mesh: below("mesh").filter(|_| shown),
             report: below("report").filter(|_| shown),
@@ -324,6 +330,7 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
         segmentation,
         beat,
         comparison,
+        serial,
         normals,
     }
 }

@@ -31,7 +31,11 @@ fn unknown_id(resource: Resource, id: &str) -> Problem {
 fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
     let fix = match resource {
         Resource::Volume => "Upload the same file again; it gets the same id.",
-        Resource::Model | Resource::Segmentation | Resource::Beat | Resource::Comparison => {
+        Resource::Model
+        | Resource::Segmentation
+        | Resource::Beat
+        | Resource::Comparison
+        | Resource::Serial => {
             "Send the same volume with the same parameters again; the result gets the same id."
         }
         Resource::Normals => {

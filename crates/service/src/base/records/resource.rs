@@ -13,6 +13,8 @@ pub enum Resource {
     Beat,
     /// Rest and stress of one patient, compared.
     Comparison,
+    /// Scans of one patient over the years, compared.
+    Serial,
     /// Normal limits: the uptake of healthy people.
     Normals,
     /// A model of the library, tried by `model=auto`.
@@ -25,12 +27,13 @@ pub enum Resource {
 
 impl Resource {
     /// Every kind.
-    pub const ALL: [Resource; 9] = [
+    pub const ALL: [Resource; 10] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
         Resource::Comparison,
+        Resource::Serial,
         Resource::Normals,
         Resource::Template,
         Resource::Reader,
@@ -38,12 +41,13 @@ impl Resource {
     ];
 
     /// The kinds that have files.
-    pub const WITH_FILES: [Resource; 8] = [
+    pub const WITH_FILES: [Resource; 9] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
         Resource::Comparison,
+        Resource::Serial,
         Resource::Normals,
         Resource::Template,
         Resource::Reader,
@@ -57,6 +61,7 @@ impl Resource {
             Resource::Segmentation => "seg_",
             Resource::Beat => "bea_",
             Resource::Comparison => "cmp_",
+            Resource::Serial => "ser_",
             Resource::Normals => "nrm_",
             Resource::Template => "tpl_",
             Resource::Reader => "rdr_",
@@ -72,6 +77,7 @@ impl Resource {
             Resource::Segmentation => "segmentation",
             Resource::Beat => "beat",
             Resource::Comparison => "comparison",
+            Resource::Serial => "serial",
             Resource::Normals => "normals",
             Resource::Template => "template",
             Resource::Reader => "reader",
@@ -87,6 +93,7 @@ impl Resource {
             Resource::Segmentation => "segmentations",
             Resource::Beat => "beats",
             Resource::Comparison => "comparisons",
+            Resource::Serial => "serials",
             Resource::Normals => "normals",
             Resource::Template => "templates",
             Resource::Reader => "readers",
@@ -98,6 +105,7 @@ impl Resource {
     pub fn label(self) -> &'static str {
         match self {
             Resource::Normals => "set of normal limits",
+            Resource::Serial => "serial comparison",
             other => other.noun(),
         }
     }

@@ -1,0 +1,195 @@
+//! `/v1/serials`: scans of one patient over the years, and the request that compares them.
+
+use crate::app::App;
+use crate::edge::caller::Caller;
+use crate::edge::quota::reserve_job;
+use crate::openapi::{self, UploadProblems, WaitAnswers};
+use crate::resources::files;
+use crate::resources::jobs::filing;
+use crate::resources::products::{self, Offer, ProductCollection, body_of_product};
+use crate::wire::fields::FieldReader;
+use crate::wire::job_fields::{OrderFields, SendFields, SerialFields};
+use crate::wire::links::path_of;
+use crate::wire::negotiate::preferred_wait;
+use crate::wire::problem::{Answer, Problem};
+use crate::wire::query::QueryReader;
+use crate::wire::webhook_request::job_webhook;
+use axum::extract::{Request, State};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+use ventriform::runs::serial::{FILE_NAMES, NUMBERED_FILE_PATTERN, SCAN_COUNTS, is_scan_mesh};
+use ventriform_service::base::records::{Product, Resource, Tenant};
+
+/// The collection of serial comparisons.
+pub struct Serials;
+
+const REPORT_FILE: &str = "serial.json";
+/// The mesh that stands for a serial comparison where one is asked for: the wall in the first scan.
+const FIRST_MESH: &str = "mesh_scan01";
+
+impl ProductCollection for Serials {
+    const RESOURCE_KIND: Resource = Resource::Serial;
+    type Body = SerialBody;
+    const MESH_NAMES: &'static [&'static str] = &[FIRST_MESH];
+    const MAIN_MESH: &'static str = FIRST_MESH;
+    const FILE_NAMES: &'static [&'static str] = FILE_NAMES;
+    const NUMBERED_FILES: Option<&'static str> = Some(NUMBERED_FILE_PATTERN);
+
+    fn is_numbered_mesh(stem: &str) -> bool {
+        is_scan_mesh(stem)
+    }
+
+    const REPORT_FILE: &'static str = REPORT_FILE;
+    const FILE_SCHEMA: &'static str = "SerialFileName";
+    const FILE_HELP: &'static str = "All meshes have the same nodes and triangles. The numbers of scans count from 01 in \
+        the order of the report.";
+}
+
+body_of_product!(
+    /// A serial comparison: scans of one patient, fitted from one common heart, with the main figures. Its volume is the
+    /// first scan of the request, its parameter `others` the others.
+    SerialBody,
+    Serial,
+    SerialLinks,
+    ventriform::parameters::SerialParameters,
+    ventriform::results::report::SerialSummary,
+    "What changed from the first to the last scan, and flags; the report has all figures.",
+    "ser_2c26b46b68ffc68ff99b453c1d304134"
+);
+
+/// Paths of one serial comparison.
+#[derive(Serialize, ToSchema)]
+struct SerialLinks {
+    /// This serial comparison.
+    #[serde(rename = "self")]
+    itself: String,
+    /// The wall in the first scan, in the format that `Accept` asks for.
+    mesh: String,
+    /// The report.
+    report: String,
+    /// The report as an HTML page.
+    page: String,
+    /// The figures of all scans, drawn.
+    trend: String,
+    /// The volumes, in the order of the request.
+    volumes: Vec<String>,
+}
+
+impl SerialLinks {
+    fn from_product(serial: &Product) -> Self {
+        let itself = path_of(&serial.id);
+        let others = serial.parameters.get("others").and_then(Value::as_str);
+        let others = others.into_iter().flat_map(|ids| ids.split(','));
+        let volumes = serial.volume.as_deref().into_iter().chain(others);
+        Self {
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
+            trend: format!("{itself}/trend.svg"),
+            volumes: volumes.map(path_of).collect(),
+            itself,
+        }
+    }
+}
+
+/// The answers that a client which waits may ask for: the report, or the trend.
+fn offers() -> Vec<Offer> {
+    vec![
+        Offer::new("application/json", REPORT_FILE),
+        Offer::new("image/svg+xml", "trend.svg"),
+    ]
+}
+
+/// Compare scans of one patient over the years
+///
+/// `scans` names 2 to 20 volumes, or segmentations or beats of them, in any order: dates of their headers order them. All are
+/// at rest or all at stress, of one tracer. All are fitted anew from one common heart; if all are gated, they become beats.
+/// `normals` names the normal limits that score all. The answer is 202 with the job, or with `Prefer: wait=60`, once it has
+/// ended, 200 with the report (`application/json`) or the trend (`image/svg+xml`).
+#[utoipa::path(post, path = "/v1/serials", tag = "serials",
+    request_body(content((openapi::SerialRequest = "application/json"))),
+    params(openapi::IdempotencyHeader, openapi::PreferHeader, openapi::WebhookSecretHeader),
+    responses(openapi::SerialAnswer, WaitAnswers, UploadProblems))]
+pub async fn create_serial(
+    State(app): State<App>,
+    caller: Caller,
+    query: QueryReader,
+    request: Request,
+) -> Answer {
+    query.all::<()>()?;
+    let headers = request.headers().clone();
+    let counting = reserve_job(&app, &caller, &headers).await?;
+    let patience = preferred_wait(&headers);
+    if patience.is_some() {
+        products::choose(&headers, &offers())?;
+    }
+    let trace_parent = crate::edge::observe::trace_parent(&request);
+    let mut body = FieldReader::read(&app, request).await?;
+    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let given: SerialFields = body.all()?;
+    let work = app.service.work_of(Resource::Serial.noun())?;
+    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
+    order.send = send.order(&app, &order.tenant, Resource::Serial.noun(), None)?;
+    let mut volumes = volumes_of(&app, &caller.tenant, given.scans).await?;
+    let first = volumes.remove(0);
+    let mut parameters = given.parameters;
+    let stated = [
+        ("others", Some(volumes.join(","))),
+        ("normals", given.normals),
+    ];
+    for (name, value) in stated {
+        let Some(value) = value else { continue };
+        if parameters.insert(name.to_owned(), value.into()).is_some() {
+            let twice = format!("`{name}` is given in the body and in `parameters`.");
+            return Err(Problem::invalid_field(name, twice).fix("Leave it out of `parameters`."));
+        }
+    }
+    let parameters = work.parameters_from_json(&parameters)?;
+    if let Some(webhook) = webhook {
+        order.webhook = Some(job_webhook(&app, webhook).await?);
+    }
+    let filed = app
+        .service
+        .file_job(work, Some(first), parameters, order, &counting)
+        .await
+        .map_err(|error| error.naming("volume", "scans[0]"))?;
+    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
+}
+
+/// The volumes that `scans` names, each once.
+async fn volumes_of(app: &App, tenant: &Tenant, scans: Option<Vec<String>>) -> Answer<Vec<String>> {
+    const FIX: &str = "Give the ids of 2 to 20 stored volumes, segmentations or beats of one patient, each scan once.";
+    let scans = scans.unwrap_or_default();
+    if !SCAN_COUNTS.contains(&scans.len()) {
+        let detail = format!("`scans` has {} entries.", scans.len());
+        return Err(Problem::invalid_field("scans", detail).fix(FIX));
+    }
+    let mut volumes: Vec<String> = Vec::with_capacity(scans.len());
+    for (place, id) in scans.iter().enumerate() {
+        let field = format!("scans[{place}]");
+        let volume = match Resource::from_id(id) {
+            Some(Resource::Volume) => id.clone(),
+            Some(Resource::Segmentation | Resource::Beat) => {
+                let product = app.service.product(tenant, id).await?;
+                match product.and_then(|product| product.item.volume) {
+                    Some(volume) => volume,
+                    None => {
+                        return Err(app.service.names_nothing(tenant, &field, id).await?.into());
+                    }
+                }
+            }
+            _ => {
+                let other =
+                    format!("`{field}` is not the id of a volume, a segmentation or a beat.");
+                return Err(Problem::invalid_field(&field, other).fix(FIX));
+            }
+        };
+        if volumes.contains(&volume) {
+            let twice = format!("`{field}` names a scan that stands before it.");
+            return Err(Problem::invalid_field(&field, twice).fix(FIX));
+        }
+        volumes.push(volume);
+    }
+    Ok(volumes)
+}
