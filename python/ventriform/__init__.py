@@ -5,10 +5,10 @@
 >>> fit = vf.segment(scan)
 >>> fit.mask, fit.confidence, fit.polar
 
-Functions: `read`, `reconstruct`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`,
-`evaluate`, `phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are
-millimetres in the patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`.
-`Coordinates` state theirs. Files are LPS, as the command writes them.
+Functions: `read`, `reconstruct`, `generate`, `segment`, `beat`, `compare`, `serial`, `build_normals`, `measure`,
+`calibrate`, `evaluate`, `phantom`. Their parameters are those of the commands of the same names (`normals build`).
+Positions are millimetres in the patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with
+`frame="LPS"`. `Coordinates` state theirs. Files are LPS, as the command writes them.
 
 Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is
 a client of the service (extra `client`).
@@ -44,6 +44,7 @@ from ._functions import (
     read,
     reconstruct,
     segment,
+    serial,
 )
 from ._native import __version__
 from ._results import (
@@ -59,6 +60,7 @@ from ._results import (
     NormalLimits,
     Phantom,
     Profile,
+    Serial,
     Surface,
     Volume,
     Wall,
@@ -91,6 +93,7 @@ __all__ = [
     "NormalLimits",
     "Phantom",
     "Profile",
+    "Serial",
     "Surface",
     "TooLargeError",
     "UnreadableError",
@@ -111,6 +114,7 @@ __all__ = [
     "reconstruct",
     "reports",
     "segment",
+    "serial",
 ]
 
 

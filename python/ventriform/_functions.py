@@ -20,6 +20,7 @@ from ._results import (
     NormalLimits,
     Phantom,
     Profile,
+    Serial,
     Surface,
     Volume,
     frame_of,
@@ -289,6 +290,56 @@ def compare(
     with _inputs.asking(*scans[0], *scans[1]):
         made = _native.compare(scans[0], scans[1], order, parameters, _how(progress, threads))
     return Comparison(made["files"], frames["stress"])
+
+
+@with_table("serial", "dicom")
+def serial(
+    *scans: Any,
+    model: Any = "auto",
+    normals: Any = None,
+    formats: Sequence[str] = ("glb", "json"),
+    deidentify: bool = False,
+    progress: Any = None,
+    threads: int | None = None,
+    **parameters: Any,
+) -> Serial:
+    """Compares scans of one patient over the years, as `ventriform serial`.
+
+    Parameters
+    ----------
+    *scans : Volume, path, bytes or image, or a sequence of gates, each
+        2 to 20 scans, all at rest or all at stress. Dates of their headers order them. Where all are gated, a beat is
+        fitted to each.
+    model, normals, formats, deidentify, progress, threads
+        As `segment` takes them.
+    [parameters]
+
+    Returns
+    -------
+    Serial
+
+    Raises
+    ------
+    InputError
+        If a heart cannot be fitted, a scan is given twice, the scans are of two patients or of two kinds, or a
+        parameter cannot be used.
+    """
+    frames = [frame_of(scan, f"scans[{place}]") for place, scan in enumerate(scans)]
+
+    def frame_for(name: str) -> Frame:
+        if len(set(frames)) > 1:
+            raise InputError(
+                name,
+                "It is for all scans, and they are in several frames.",
+                "Give ventriform.Coordinates(numbers, frame=...), or bring all to one frame.",
+            )
+        return frames[0] if frames else "RAS"
+
+    parameters, order = _ordered("serial", parameters, deidentify, frame_for)
+    order |= _order(model, formats, (), (normals, parameters), deidentify)
+    given = [_inputs.gates(scan, unwrap) for scan in scans]
+    with _inputs.asking(*(volume for scan in given for volume in scan)):
+        return Serial(_native.serial(given, order, parameters, _how(progress, threads))["files"])
 
 
 def measure(

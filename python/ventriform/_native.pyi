@@ -56,6 +56,9 @@ def compare(
     parameters: dict[str, Any],
     how: _How,
 ) -> dict[str, Any]: ...
+def serial(
+    scans: Sequence[Sequence[NativeVolume]], order: dict[str, Any], parameters: dict[str, Any], how: _How
+) -> dict[str, Any]: ...
 def measure(
     mask: NativeVolume,
     reference: NativeVolume,

@@ -788,6 +788,87 @@ def _triangles(made: dict[str, Any]) -> NDArray[np.int32]:
     return faces
 
 
+def _map_of(files: Files, name: str) -> _Floats:
+    """The values of a polar map, of uptake or of another figure."""
+    import numpy as np
+
+    document = files.json(name)
+    return np.array(document.get("values_percent", document.get("values")), dtype=np.float64)
+
+
+class Serial(Result):
+    """Scans of one patient over the years, compared."""
+
+    def __init__(self, files: dict[str, bytes]) -> None:
+        self.files = Files(files)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Serial, (dict(self.files),)
+
+    @property
+    def report(self) -> reports.SerialReport:
+        """The figures of `serial.json`: those of every scan, and what changed from scan to scan."""
+        from .reports import SerialReport
+
+        return SerialReport.from_json(self.files["serial.json"])
+
+    @cached_property
+    def _report(self) -> reports.SerialReport:
+        return self.report
+
+    @property
+    def flags(self) -> list[Flag]:
+        """Reasons to look closer."""
+        return [Flag(flag.code, flag.reason) for flag in self._report.flags]
+
+    def change(self, figure: str, earlier: int = 1, later: int | None = None) -> reports.FigureChange:
+        """The change of a figure, by its name in `report.scans`: from the first to the last scan, or between others."""
+        later = len(self._report.scans) if later is None else later
+        for own in self._report.changes:
+            if (own.figure, own.earlier, own.later) == (figure, earlier, later):
+                return own
+        known = sorted({own.figure for own in self._report.changes})
+        raise InputError(
+            "figure",
+            f"There is no change of `{figure}` from scan {earlier} to {later}.",
+            f"Give one of {', '.join(known)}, and scans that are compared: each with the first and the one before.",
+        )
+
+    def _rows(self) -> list[_html.Row]:
+        last = len(self._report.scans)
+        rows: list[_html.Row] = [("scans", str(last))]
+        for own in self._report.changes:
+            if (own.earlier, own.later) == (1, last):
+                low, high = own.interval
+                text = f"{own.change:+.1f} ({low:.1f} to {high:.1f}), changed: {own.verdict.replace('_', ' ')}"
+                rows.append((own.figure, text))
+        return [*rows, *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags)]
+
+    def _repr_html_(self) -> str:
+        return _html.table("Serial comparison", self._rows())
+
+    def __repr__(self) -> str:
+        report = self._report
+        pair = report.pairs[0] if len(report.scans) == 2 else report.pairs[len(report.scans) - 2]
+        return (
+            f"Serial({len(report.scans)} scans, worse {pair.worse_percent:.0f} % ({pair.worse_verdict}), better "
+            f"{pair.better_percent:.0f} % ({pair.better_verdict}))"
+        )
+
+    def polar(self, scan: int) -> _Floats:
+        """The polar map of a scan, counted from 1, (32, 60); NaN where there is none."""
+        return self._map(f"polar_scan{scan:02}.json")
+
+    def polar_change(self, earlier: int, later: int) -> _Floats:
+        """The map of the change between two scans, earlier less later, points, (32, 60); NaN where there is none."""
+        return self._map(f"polar_change_{earlier:02}_{later:02}.json")
+
+    def _map(self, name: str) -> _Floats:
+        if name not in self.files:
+            raise InputError("scan", f"There is no {name}.", "Scans are counted from 1, in the order of the report.")
+        return _map_of(self.files, name)
+
+
 class Comparison(Result):
     """Rest and stress of one patient, compared.
 
@@ -844,14 +925,10 @@ class Comparison(Result):
 
     def polar(self, scan: str) -> _Floats:
         """The polar map of `stress`, `rest` or their `difference`, (32, 60); NaN where there is none."""
-        import numpy as np
-
         name = f"polar_{scan}.json"
         if name not in self.files:
             raise InputError("scan", f"There is no map of `{scan}`.", "Give stress, rest or difference.")
-        document = self.files.json(name)
-        values = document.get("values_percent", document.get("values"))
-        return np.array(values, dtype=np.float64)
+        return _map_of(self.files, name)
 
 
 class Measured:

@@ -36,7 +36,13 @@ COPIED_BYTES = 1 << 20
 POLL_SECONDS = 0.2
 
 #: The function of each kind of job, whose table has its parameters.
-FUNCTIONS = {"model": "generate", "segmentation": "segment", "beat": "beat", "comparison": "compare"}
+FUNCTIONS = {
+    "model": "generate",
+    "segmentation": "segment",
+    "beat": "beat",
+    "comparison": "compare",
+    "serial": "serial",
+}
 
 MOST_PORT = 65535
 

@@ -524,6 +524,28 @@ class FigureBeside(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class FigureChange(Document):
+    """The change of a figure from an earlier to a later scan."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    change: float
+    """The later figure less the earlier one."""
+    earlier: int
+    """The earlier scan."""
+    figure: str
+    """The figure: its name in `scans`."""
+    interval: list[float]
+    """The 95 % interval of the change."""
+    later: int
+    """The later one."""
+    least_change: float
+    """The least change that nine of ten such pairs of scans would show."""
+    verdict: str
+    """Whether it changed."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class FileFacts(Document):
     """The statements of a volume's file."""
 
@@ -915,6 +937,8 @@ class Job(Document):
     """Grows with every change; also the id of the events."""
     segmentation: str | None = None
     """The segmentation it made; only for kind `segmentation`."""
+    serial: str | None = None
+    """The serial comparison it made; only for kind `serial`."""
     source: JobSource | None = None
     """The series in an archive that the volume comes from."""
     stage: str | None = None
@@ -953,6 +977,8 @@ class JobLinks(Document):
     """The segmentation it made."""
     self_: str
     """This job."""
+    serial: str | None = None
+    """The serial comparison it made."""
     volume: str | None = None
     """Its volume, once it is stored."""
 
@@ -1833,6 +1859,157 @@ class SegmentationReport(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class SerialPair(Document):
+    """The change of the wall's uptake from an earlier to a later scan. Uptake is in per cent of the earlier scan's
+    reference, the later one scaled to it by the wall that did not change."""
+
+    _built: ClassVar[dict[str, str]] = {"segments": "SerialSegment[]"}
+
+    better_interval_percent: list[float]
+    """Its interval."""
+    better_percent: float
+    """Share of the wall that gained uptake."""
+    better_verdict: str
+    """Whether wall gained uptake."""
+    compared_percent: float
+    """Share of the wall with muscle in both scans."""
+    correlation: float
+    """Correlation of both maps."""
+    dark_in_both_percent: float
+    """Share of the wall below the threshold in both scans."""
+    detectable_percent: float
+    """The least loss, per cent, that is found in nine of ten such pairs if it takes up a territory."""
+    earlier: int
+    """The earlier scan."""
+    later: int
+    """The later one."""
+    lost_percent: float
+    """What the later scan lacks in the regions that lost uptake, per cent of the whole wall's uptake."""
+    matched_percent: float
+    """Share of the wall by which the later scan was scaled."""
+    noise_points: float
+    """Standard deviation of the smoothed difference by the noise of this pair, points."""
+    scale: float
+    """Counts of the later scan that are one count of the earlier one where nothing changed."""
+    segments: list[SerialSegment]
+    """The 17 segments."""
+    worse_interval_percent: list[float]
+    """Its interval by noise: 5th and 95th percentile."""
+    worse_percent: float
+    """Share of the wall that lost uptake, each region as far as half of the depth of its loss."""
+    worse_verdict: str
+    """Whether wall lost uptake."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SerialReport(Document):
+    """The report of a serial comparison: scans of one patient, and what changed from scan to scan."""
+
+    _built: ClassVar[dict[str, str]] = {"changes": "FigureChange[]", "flags": "Flag[]", "pairs": "SerialPair[]", "scans": "SerialScan[]"}
+
+    changes: list[FigureChange]
+    """The change of every figure: of every scan against the first one, and then against the one before it."""
+    flags: list[Flag]
+    """Reasons to look closer."""
+    gated: bool
+    """Whether all scans are gated, so that there are beats."""
+    pairs: list[SerialPair]
+    """The change of the wall's uptake, likewise."""
+    parameters: dict[str, Any]
+    """Every parameter, defaults written out."""
+    scans: list[SerialScan]
+    """The scans, in the order of their dates."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SerialScan(Document):
+    """A scan of a series. All are fitted from one common heart."""
+
+    _built: ClassVar[dict[str, str]] = {"input": "FileFacts", "polar": "PolarSummary", "resolution_mm": "Resolution"}
+
+    beats_per_minute: float | None = None
+    """Beats a minute; `null` unless the scan is gated and its R-R interval is known."""
+    cavity_ml: float | None = None
+    """Volume of the cavity in the image of all gates."""
+    confidence: float
+    """Confidence of the fit of this scan alone, 0..=1."""
+    correlation: float
+    """Correlation of the image with that of the first scan about the wall."""
+    dark_percent: float | None = None
+    """Share of the wall below the threshold, a share of the scan's own maximum."""
+    date: str | None = None
+    """The date, `YYYY-MM-DD`; `null` where the header states none."""
+    deficit_percent: float | None = None
+    """Deficit score."""
+    edv_ml: float | None = None
+    """End-diastolic volume."""
+    ef_percent: float | None = None
+    """Ejection fraction, per cent; `null` unless all scans are gated, as for the others of the beat."""
+    esv_ml: float | None = None
+    """End-systolic volume."""
+    extent_percent: float | None = None
+    """Share of the wall below the normal limit; `null` without normal limits, as for the other two."""
+    given: int
+    """Its number as it was given."""
+    input: FileFacts
+    """The file."""
+    mass_g: float | None = None
+    """Mass of the muscle by the fit of this scan alone; the volumes of all scans stand on one common mass."""
+    motion_mm: float | None = None
+    """Inward motion, the mean of the segments."""
+    moved_mm: float
+    """How far the heart lies from where it was in the first scan, mm."""
+    number: int
+    """Its number."""
+    phase_bandwidth_degrees: float | None = None
+    """Bandwidth of the phases."""
+    phase_sd_degrees: float | None = None
+    """Standard deviation of the phases; `null` where they are not reliable."""
+    polar: PolarSummary | None = None
+    """Uptake of the wall, by its own reference."""
+    resolution_mm: Resolution | None = None
+    """Full width at half maximum of the image's point response."""
+    series_description: str | None = None
+    """Series Description, if the header has one."""
+    summed_score: float | None = None
+    """Summed score, 0 to 68."""
+    template: str
+    """The model that was fitted."""
+    thickening_percent: float | None = None
+    """Thickening, the mean of the segments."""
+    turned_degrees: float
+    """By how much it is turned against the first scan, degrees."""
+    warnings: list[str]
+    """Warnings about the file."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SerialSegment(Document):
+    """The change of a segment from an earlier to a later scan."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    change_interval_points: list[float] | None = None
+    """Its 95 % interval."""
+    change_points: float | None = None
+    """The later less the earlier, points."""
+    change_verdict: str | None = None
+    """Whether it changed."""
+    earlier_percent: float | None = None
+    """Its mean uptake in the earlier scan; `null` where nothing can be compared, as for the others."""
+    later_percent: float | None = None
+    """In the later one."""
+    motion_change_mm: float | None = None
+    """Change of the inward motion, mm; `null` unless all scans are gated."""
+    name: str
+    """Its name."""
+    segment: int
+    """Its number, 1 to 17."""
+    thickening_change_points: float | None = None
+    """Change of the thickening, points."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Shape(Document):
     """Figures of the triangles' shapes."""
 
@@ -2293,14 +2470,15 @@ class WallVolumes(Document):
 
 register(
     Agreement, AppliedReader, BeatChange, BeatReport, Candidate, ComparedScan, ComparedSegment, ComparedTerritory,
-    ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, ExcludedCase, FigureBeside, FileFacts, Fit,
-    FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes,
-    Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks,
-    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, MoveReport,
-    NoBeat, NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion,
-    PhaseReport, PolarAttenuation, PolarMap, PolarSegment, PolarSummary, Posture, Problem, ProjectionsReport,
-    RatesReport, ReaderOffsets, RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport,
-    SegmentScore, SegmentationReport, Shape, Smoothness, Software, Specificity, Start, Summary, SurfaceNoise,
-    SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty,
-    UncorrectedReport, Valence, ViewReport, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks, WallVolumes,
+    ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, ExcludedCase, FigureBeside, FigureChange,
+    FileFacts, Fit, FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,
+    FittedVolumes, Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job,
+    JobLinks, JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport,
+    MoveReport, NoBeat, NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport,
+    Perfusion, PhaseReport, PolarAttenuation, PolarMap, PolarSegment, PolarSummary, Posture, Problem,
+    ProjectionsReport, RatesReport, ReaderOffsets, RefusedTemplate, Resolution, RetileReport, Scaling, Scan,
+    SegmentMotionReport, SegmentScore, SegmentationReport, SerialPair, SerialReport, SerialScan, SerialSegment,
+    Shape, Smoothness, Software, Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory,
+    TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty, UncorrectedReport, Valence,
+    ViewReport, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks, WallVolumes,
 )

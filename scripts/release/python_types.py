@@ -27,6 +27,7 @@ DOCUMENTS = [
     "SegmentationReport",
     "BeatReport",
     "ComparisonReport",
+    "SerialReport",
     "NormalLimits",
     "PolarMap",
     "Agreement",
@@ -39,6 +40,7 @@ OPEN = {
     "SegmentationParameters",
     "BeatParameters",
     "ComparisonParameters",
+    "SerialParameters",
     "NormalsFitParameters",
     "JobParameters",
 }

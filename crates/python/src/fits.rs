@@ -13,13 +13,14 @@ use pyo3::types::{PyBytes, PyDict};
 use ventriform::base::progress::Plan;
 use ventriform::image::volume::ReadLimits;
 use ventriform::mesh::files::MeshStatement;
-use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters};
+use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters, SerialChoice};
 use ventriform::results::export::Part;
 use ventriform::results::export::dicom::{Deidentification, Moment, StatedIdentity};
 use ventriform::runs::gated::{self, GatedOrder};
 use ventriform::runs::objects::{self, ObjectChoice, ObjectError};
 use ventriform::runs::rest_stress::{self, ComparisonOrder};
 use ventriform::runs::segmentation::{self, SegmentationOrder};
+use ventriform::runs::serial::{self, SerialOrder};
 
 /// The inputs of a fit beside its parameters.
 #[derive(FromPyObject)]
@@ -274,6 +275,70 @@ pub fn compare<'py>(
                 rest.of_compared(&made.rest),
             ];
             let objects = made.dicom_files(&scans, &files);
+            files.extend(objects.map_err(|error| stopped(&error))?);
+        }
+        Ok(named(files))
+    })?;
+    let result = PyDict::new(py);
+    result.set_item("files", files_of(py, files)?)?;
+    Ok(result)
+}
+
+/// Scans of one patient over the years.
+#[pyfunction]
+#[pyo3(name = "serial", signature = (scans, order, parameters, how))]
+pub fn serial_comparison<'py>(
+    py: Python<'py>,
+    scans: Vec<Vec<Py<NativeVolume>>>,
+    mut order: FitOrder,
+    parameters: &Bound<'py, PyDict>,
+    how: How<'py>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let parameters = with_fit::<SerialChoice>(parameters)?;
+    let objects = order.objects();
+    let scans: Vec<_> = scans.iter().map(|scan| files(scan)).collect();
+    let (given, limits_given) = (GivenModels::new(order.model), order.normals);
+    let names = order.formats;
+    let files = run(py, Plan::SERIAL, &how, |monitor| {
+        let (objects, stated) = objects?;
+        let limits = ReadLimits::default();
+        let formats = formats(&names)?;
+        let ordered = |choice: &objects::ObjectChoice| {
+            let scans = scans.iter();
+            scans
+                .map(|files| choice.order_of_either(files, &limits, monitor))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let objects = objects
+            .as_ref()
+            .map(ordered)
+            .transpose()
+            .map_err(unordered)?;
+        let whose = stated.zip(scans.first());
+        let whose = whose.map(|(s, first)| objects::whose_either(first, &s, &limits, monitor));
+        let whose = whose
+            .transpose()
+            .map_err(|error| stopped(&error))?
+            .flatten();
+        let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
+        let normals = normals(limits_given)?;
+        let order = SerialOrder {
+            scans: &scans,
+            auto,
+            models,
+            normals: normals.as_ref(),
+            parameters: &parameters,
+        };
+        let made = serial::from_files(&order, &limits, monitor);
+        let made = made.map_err(|error| stopped(&error))?;
+        let mut files = made.files(&formats, monitor).map_err(unwritable)?;
+        files.push(made.page(&files, whose.as_ref()));
+        if let Some(objects) = objects {
+            let mut objects: Vec<_> = objects.into_iter().map(Some).collect();
+            let sources: Vec<_> = (made.scans.iter())
+                .filter_map(|scan| Some(objects[scan.given - 1].take()?.of_compared(&scan.heart)))
+                .collect();
+            let objects = made.dicom_files(&sources);
             files.extend(objects.map_err(|error| stopped(&error))?);
         }
         Ok(named(files))

@@ -36,7 +36,7 @@ mod _native {
     #[pymodule_export]
     use super::figures::headlines;
     #[pymodule_export]
-    use super::fits::{beat, compare, segment};
+    use super::fits::{beat, compare, segment, serial_comparison};
     #[pymodule_export]
     use super::masks::measure;
     #[pymodule_export]

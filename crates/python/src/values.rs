@@ -7,7 +7,7 @@ use serde_json::{Map, Number, Value};
 use ventriform::parameters::{
     BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, CalibrationChoice, ComparisonChoice,
     FIT_SPECS, Kind, MODEL_SPECS, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec,
-    Parameters, RECONSTRUCTION_SPECS, WithFit,
+    Parameters, RECONSTRUCTION_SPECS, SERIAL_SPECS, SerialChoice, WithFit,
 };
 use ventriform::runs::advice::Explain;
 
@@ -127,6 +127,9 @@ pub fn parameter_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         &rows(py, WithFit::<ComparisonChoice>::fit_specs())?,
     )?;
     tables.set_item("compare", compare)?;
+    let serial = rows(py, SERIAL_SPECS)?;
+    extend(&serial, &rows(py, WithFit::<SerialChoice>::fit_specs())?)?;
+    tables.set_item("serial", serial)?;
     let normals = rows(py, NORMALS_SPECS)?;
     extend(&normals, &rows(py, WithFit::<NormalsChoice>::fit_specs())?)?;
     tables.set_item("normals", normals)?;
