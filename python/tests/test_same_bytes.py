@@ -100,6 +100,18 @@ def test_a_comparison(folder: pathlib.Path, command: Command, tmp_path: pathlib.
     assert ours.report.segments[7].reversible_percent > 20
 
 
+def test_scans_over_the_years(folder: pathlib.Path, command: Command, tmp_path: pathlib.Path) -> None:
+    stress, rest = (folder / name / "spect.nii.gz" for name in ("stress", "rest"))
+    command("serial", stress, rest, "-o", tmp_path / "out")
+    ours = vf.serial(stress, rest)
+    assert_same(ours.files, tmp_path / "out")
+    assert ours.polar_change(1, 2).shape == ours.polar(2).shape == (32, 60)
+    assert ours.report.to_dict() == json.loads((tmp_path / "out/serial.json").read_text())
+    # The first one has the defect.
+    assert ours.report.pairs[0].better_verdict == "yes"
+    assert ours.change("cavity_ml").verdict in ("no", "cannot_tell")
+
+
 def test_normal_limits(command: Command, tmp_path: pathlib.Path) -> None:
     healthy = tmp_path / "healthy"
     command("phantom", "--normal", "--cases", 14, "-o", healthy)

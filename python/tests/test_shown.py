@@ -44,6 +44,7 @@ def objects(
         "Beat": vf.beat(gated),
         "Phantom": vf.Phantom(volume, volume),
         "Comparison": vf.compare(stress=folder / "stress/spect.nii.gz", rest=scan),
+        "Serial": vf.serial(folder / "stress/spect.nii.gz", scan),
         "Measured": vf.measure(fit, fit),
         "Profile": vf.Profile(b'{"format": "ventriform-reader-profile", "kind": "level"}', "<b>Eve</b>"),
         "Calibration": vf.Calibration(vf.Profile(b'{"format": "ventriform-reader-profile"}'), [], [("a<", "b")]),

@@ -302,7 +302,7 @@ def compare(
     made_at: str | datetime | None = None,
 ) -> Comparison: ...
 def serial(
-    *,
+    *scans: Any,
     model: Any = 'auto',
     normals: Any = None,
     formats: Sequence[str] = ('glb', 'json'),

@@ -193,8 +193,11 @@ def wrapped(definition):
     pairs = [(a, d) for a, d in zip(positional, defaults)]
     for arg, default in pairs:
         parts.append(argument(arg, default))
-    if args.kwonlyargs:
+    if args.vararg:
+        parts.append("*" + argument(args.vararg, None))
+    elif args.kwonlyargs:
         parts.append("*")
+    if args.kwonlyargs:
         parts += [argument(a, d) for a, d in zip(args.kwonlyargs, args.kw_defaults)]
     returns = f" -> {ast.unparse(node.returns)}" if node.returns else ""
     body = "".join(f"    {part},\n" for part in parts)
