@@ -25,7 +25,7 @@ for name, told in functions.items():
         [html.unescape(re.sub(r"<[^>]+>", "", cell)).strip() for cell in re.findall(r"<td>(.*?)</td>", row, re.S)]
         for row in re.findall(r'<tr class="doc-section-item">.*?</tr>', section[0], re.S)
     ]
-    defaults = {row[0]: row[-1] for row in cells if len(row) == 4}
+    defaults = {row[0].lstrip("*"): row[-1] for row in cells if len(row) == 4}
     for one in told["parameters"]:
         rows += 1
         wanted = one["default"] or "required"
