@@ -10,7 +10,7 @@ use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 
 impl TestApp {
     /// Compares the volumes of these words; returns the serial comparison.
-    async fn serial(&self, said: &[&str]) -> Value {
+    pub async fn serial(&self, said: &[&str]) -> Value {
         let mut scans = Vec::new();
         for words in said {
             scans.push(self.volume(words).await);

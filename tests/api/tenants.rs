@@ -140,6 +140,7 @@ impl Belongings {
         let fit = a.until(&fit, &["succeeded"]).await;
         let beat = a.beat("sphere").await;
         let comparison = a.comparison("sphere stress", "sphere rest").await;
+        let serial = a.serial(&["sphere before", "sphere after"]).await;
         let normals = a.normals("sphere").await;
         let template = format!("/v1/templates?model={model}&organ=generic");
         let template = sent(a.post(&template)).await;
@@ -162,6 +163,7 @@ impl Belongings {
                 ("segmentations", text(&fit["segmentation"])),
                 ("beats", id_of(&beat)),
                 ("comparisons", id_of(&comparison)),
+                ("serials", id_of(&serial)),
                 ("normals", id_of(&normals)),
                 ("templates", id_of(&template)),
                 ("readers", id_of(&reader)),
@@ -248,7 +250,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 // of the tests does not make every file of a result.
                 let (status, _) = seen(&a, &method, &filled).await;
                 let file = path.rsplit('/').next().unwrap();
-                let renamed = ["/v1/beats/", "/v1/comparisons/"];
+                let renamed = ["/v1/beats/", "/v1/comparisons/", "/v1/serials/"];
                 let renamed = renamed.iter().any(|other| path.starts_with(other));
                 let made = MESH_FILES.contains(&file) && !renamed;
                 let unmade = file.contains('.') && !made;
@@ -308,6 +310,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 "segmentations",
                 "beats",
                 "comparisons",
+                "serials",
                 "normals",
                 "templates",
                 "readers",
@@ -358,6 +361,27 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         let path = format!("/v1/{job}s?{field}={}", theirs.ids[kind]);
         let upload = b.post(&path).body(volume("sphere mine")).send();
         problem(upload.await.unwrap(), 422, "invalid-field").await;
+    }
+    // A scan of another tenant is one that never was.
+    for (path, field) in [
+        ("/v1/comparisons", "stress"),
+        ("/v1/serials", "scans[0]"),
+        ("/v1/serials", "scans[1]"),
+    ] {
+        let named = async |id: &str| {
+            let order = match field {
+                "stress" => json!({"stress": id, "rest": mine}),
+                "scans[0]" => json!({"scans": [id, mine]}),
+                _ => json!({"scans": [mine, id]}),
+            };
+            let refused = b.post(path).json(&order).send().await.unwrap();
+            let mut told = problem(refused, 422, "invalid-field").await;
+            assert_eq!(told["field"], field, "{told}");
+            told["detail"] = text(&told["detail"]).replace(id, "the scan").into();
+            told["detail"].clone()
+        };
+        let foreign = &theirs.ids["volumes"];
+        assert_eq!(named(foreign).await, named(&nobodys(foreign)).await);
     }
     for kind in ["models", "segmentations"] {
         let copied = b.post(&format!("/v1/templates?model={}", theirs.ids[kind]));

@@ -7,6 +7,7 @@ use crate::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use crate::resources::files;
 use crate::resources::jobs::PriorityQuery;
 use crate::resources::jobs::filing::{self, UploadJob};
+use crate::resources::named_scan::{NamedScan, SCAN_ID_FIX, add, named_scan};
 use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
 use crate::resources::tags::TagQuery;
 use crate::wire::fields::FieldReader;
@@ -151,11 +152,11 @@ pub async fn create_comparison(
     let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
     order.send = send.order(&app, &order.tenant, Resource::Comparison.noun(), None)?;
     let tenant = &caller.tenant;
-    let stress = scan_of(&app, tenant, scans.stress, WhichScan::Stress).await?;
+    let (stress, of_stress) = scan_of(&app, tenant, scans.stress, WhichScan::Stress).await?;
     let mut parameters = scans.parameters;
-    let rest = scan_of(&app, tenant, scans.rest, WhichScan::Rest).await?;
-    add(&mut parameters, "rest", rest.volume)?;
-    for (name, correction) in stress.corrections.into_iter().chain(rest.corrections) {
+    let (rest, of_rest) = scan_of(&app, tenant, scans.rest, WhichScan::Rest).await?;
+    add(&mut parameters, "rest", rest)?;
+    for (name, correction) in of_stress.into_iter().chain(of_rest) {
         parameters.entry(name).or_insert(correction);
     }
     if let Some(normals) = scans.normals {
@@ -167,7 +168,7 @@ pub async fn create_comparison(
     }
     let filed = app
         .service
-        .file_job(work, Some(stress.volume), parameters, order, &counting)
+        .file_job(work, Some(stress), parameters, order, &counting)
         .await
         .map_err(|error| error.naming("volume", WhichScan::Stress.as_str()))?;
     filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
@@ -192,58 +193,18 @@ fn refuse_query(app: &App, query: QueryReader) -> Answer<()> {
     }
 }
 
-/// Adds a field of the request to the parameters.
-fn add(parameters: &mut Map<String, Value>, name: &str, value: String) -> Answer<()> {
-    match parameters.insert(name.to_owned(), value.into()) {
-        None => Ok(()),
-        Some(_) => {
-            let twice = format!("`{name}` is given in the body and in `parameters`.");
-            Err(Problem::invalid_field(name, twice).fix("Leave it out of `parameters`."))
-        }
-    }
-}
-
-/// A scan that a request names.
-struct NamedScan {
-    /// The id of its volume.
-    volume: String,
-    /// What was corrected of the fit that the request names, as parameters of the comparison.
-    corrections: Map<String, Value>,
-}
-
-/// The scan that a field names: a volume, or that of the segmentation or the beat which the field names.
+/// The scan that a field names, and what was corrected of the fit that names it, as parameters of the comparison.
 async fn scan_of(
     app: &App,
     tenant: &Tenant,
     given: Option<String>,
     scan: WhichScan,
-) -> Answer<NamedScan> {
+) -> Answer<(String, Map<String, Value>)> {
     let field = scan.as_str();
     let Some(id) = given else {
         let missing = format!("`{field}` is missing.");
-        return Err(Problem::invalid_field(field, missing)
-            .fix("Give the id of a stored volume, segmentation or beat."));
+        return Err(Problem::invalid_field(field, missing).fix(SCAN_ID_FIX));
     };
-    match Resource::from_id(&id) {
-        Some(Resource::Segmentation | Resource::Beat) => {
-            let product = app.service.product(tenant, &id).await?;
-            let fit = product.map(|product| (product.item.volume, product.item.parameters));
-            match fit {
-                Some((Some(volume), parameters)) => Ok(NamedScan {
-                    volume,
-                    corrections: ComparisonChoice::corrections_of(&parameters, scan),
-                }),
-                _ => Err(app.service.names_nothing(tenant, field, &id).await?.into()),
-            }
-        }
-        Some(Resource::Volume) => Ok(NamedScan {
-            volume: id,
-            corrections: Map::new(),
-        }),
-        _ => {
-            let other = format!("`{field}` is not the id of a volume, a segmentation or a beat.");
-            Err(Problem::invalid_field(field, other)
-                .fix("Give the id of a stored volume, segmentation or beat."))
-        }
-    }
+    let NamedScan { volume, fit } = named_scan(app, tenant, field, &id).await?;
+    Ok((volume, ComparisonChoice::corrections_of(&fit, scan)))
 }

@@ -9,6 +9,7 @@ pub(crate) mod identities;
 pub(crate) mod jobs;
 pub(crate) mod legal_hold;
 pub(crate) mod models;
+mod named_scan;
 pub(crate) mod normals;
 pub(crate) mod products;
 pub(crate) mod readers;

@@ -6,6 +6,7 @@ use crate::edge::quota::reserve_job;
 use crate::openapi::{self, UploadProblems, WaitAnswers};
 use crate::resources::files;
 use crate::resources::jobs::filing;
+use crate::resources::named_scan::{add, named_scan};
 use crate::resources::products::{self, Offer, ProductCollection, body_of_product};
 use crate::wire::fields::FieldReader;
 use crate::wire::job_fields::{OrderFields, SendFields, SerialFields};
@@ -133,17 +134,14 @@ pub async fn create_serial(
     order.send = send.order(&app, &order.tenant, Resource::Serial.noun(), None)?;
     let mut volumes = volumes_of(&app, &caller.tenant, given.scans).await?;
     let first = volumes.remove(0);
+    let named = (0..volumes.len()).map(|n| (format!("others[{n}]"), format!("scans[{}]", n + 1)));
+    let named: Vec<_> = named
+        .chain([("volume".into(), "scans[0]".into())])
+        .collect();
     let mut parameters = given.parameters;
-    let stated = [
-        ("others", Some(volumes.join(","))),
-        ("normals", given.normals),
-    ];
-    for (name, value) in stated {
-        let Some(value) = value else { continue };
-        if parameters.insert(name.to_owned(), value.into()).is_some() {
-            let twice = format!("`{name}` is given in the body and in `parameters`.");
-            return Err(Problem::invalid_field(name, twice).fix("Leave it out of `parameters`."));
-        }
+    add(&mut parameters, "others", volumes.join(","))?;
+    if let Some(normals) = given.normals {
+        add(&mut parameters, "normals", normals)?;
     }
     let parameters = work.parameters_from_json(&parameters)?;
     if let Some(webhook) = webhook {
@@ -153,7 +151,10 @@ pub async fn create_serial(
         .service
         .file_job(work, Some(first), parameters, order, &counting)
         .await
-        .map_err(|error| error.naming("volume", "scans[0]"))?;
+        .map_err(|error| {
+            let named = named.iter();
+            named.fold(error, |error, (inner, sent)| error.naming(inner, sent))
+        })?;
     filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
 }
 
@@ -168,23 +169,7 @@ async fn volumes_of(app: &App, tenant: &Tenant, scans: Option<Vec<String>>) -> A
     let mut volumes: Vec<String> = Vec::with_capacity(scans.len());
     for (place, id) in scans.iter().enumerate() {
         let field = format!("scans[{place}]");
-        let volume = match Resource::from_id(id) {
-            Some(Resource::Volume) => id.clone(),
-            Some(Resource::Segmentation | Resource::Beat) => {
-                let product = app.service.product(tenant, id).await?;
-                match product.and_then(|product| product.item.volume) {
-                    Some(volume) => volume,
-                    None => {
-                        return Err(app.service.names_nothing(tenant, &field, id).await?.into());
-                    }
-                }
-            }
-            _ => {
-                let other =
-                    format!("`{field}` is not the id of a volume, a segmentation or a beat.");
-                return Err(Problem::invalid_field(&field, other).fix(FIX));
-            }
-        };
+        let volume = named_scan(app, tenant, &field, id).await?.volume;
         if volumes.contains(&volume) {
             let twice = format!("`{field}` names a scan that stands before it.");
             return Err(Problem::invalid_field(&field, twice).fix(FIX));
