@@ -21,7 +21,7 @@ export type { JobState, Normals, Problem, Volume } from "./generated/openapi";
 export type FileOfResult = Download;
 /** Kinds of work on scans. */
 export type Kind = "model" | "segmentation" | "beat" | "comparison";
-export type Job = AnyJob & { kind: Kind | "normals" };
+export type Job = AnyJob & { kind: Kind | "serial" | "normals" };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;

@@ -11,6 +11,7 @@ const KINDS: Record<Job["kind"], string> = {
   segmentation: "Fit",
   beat: "Beat",
   comparison: "Rest and stress",
+  serial: "Over the years",
   normals: "Normal limits",
 };
 

@@ -268,7 +268,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   const [sending, setSending] = useState(false);
 
   const repeat = ({ kind, parameters }: Pick<Job, "kind" | "parameters">) => {
-    if (kind === "normals" || kind === "comparison") return;
+    if (kind === "normals" || kind === "comparison" || kind === "serial") return;
     setKind(kind);
     setTab("work");
     void parameterSpecs().then(specs => setDraft(draftOf(parameters as Parameters, specs[kind])));
