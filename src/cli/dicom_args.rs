@@ -87,16 +87,16 @@ impl DicomArgs {
         self.ordered(|choice| choice.order_of_gates(files, limits, &Monitor::silent()))
     }
 
-    /// As [`DicomArgs::order`], of a scan that may be gated.
+    /// As [`DicomArgs::order`], of scans of one patient, gated or not.
     ///
     /// # Errors
     /// As there.
-    pub(super) fn order_of_either(
+    pub(super) fn order_of_scans(
         &self,
-        files: &[VolumeFile],
+        scans: &[Vec<VolumeFile>],
         limits: &ReadLimits,
-    ) -> Result<Option<ObjectOrder>> {
-        self.ordered(|choice| choice.order_of_either(files, limits, &Monitor::silent()))
+    ) -> Result<Option<Vec<ObjectOrder>>> {
+        self.ordered(|choice| choice.order_of_scans(scans, limits, &Monitor::silent()))
     }
 
     /// As [`DicomArgs::order`], of two scans of one patient, gated or not.

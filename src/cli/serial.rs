@@ -19,6 +19,7 @@ use ventriform::results::export::Format;
 use ventriform::results::figures::serial::SCAN_FIGURES;
 use ventriform::results::report::{SerialPairReport, SerialReport};
 use ventriform::runs::advice::Explain;
+use ventriform::runs::objects;
 use ventriform::runs::serial::{SerialOrder, from_files};
 
 /// Compare scans of one patient over the years: what really changed
@@ -81,9 +82,7 @@ pub fn run(args: &SerialArgs) -> Result<()> {
         return Err(UnusableArgument::new("give two scans or more".to_owned()).into());
     };
     let normals = args.normals.limits(&parameters.fit)?;
-    let mut objects: Vec<_> = (scans.iter())
-        .map(|files| args.dicom.order_of_either(files, &limits))
-        .collect::<Result<_>>()?;
+    let objects = args.dicom.order_of_scans(&scans, &limits)?;
     let whose = args.dicom.whose_of_either(first, &limits)?;
     let (auto, models) = chosen_models(&args.model, &MeshStatement::default(), &limits)?;
     let order = SerialOrder {
@@ -101,14 +100,8 @@ pub fn run(args: &SerialArgs) -> Result<()> {
     bar.finish();
     let (mut files, made) = made?;
     files.push(made.page(&files, whose.as_ref()));
-    let sources: Vec<_> = (made.scans.iter())
-        .filter_map(|scan| {
-            let order = objects[scan.given - 1].take()?;
-            Some(order.of_compared(&scan.heart))
-        })
-        .collect();
-    if !sources.is_empty() {
-        let written = made.dicom_files(&sources);
+    if let Some(orders) = objects {
+        let written = made.dicom_files(&objects::of_serial(&orders, &made));
         files.extend(written.map_err(|error| anyhow!(error.with_advice()))?);
     }
     write_all(&args.output, &files)?;
@@ -133,9 +126,8 @@ fn line(report: &SerialReport, pair: &SerialPairReport) -> String {
     let mut said: Vec<String> = (SCAN_FIGURES.iter())
         .filter_map(|row| {
             let own = report.change(row.place, earlier, later)?;
-            let sign = if own.change > 0.0 { "+" } else { "" };
-            let (value, verdict) = (row.written(own.change), own.verdict.as_str());
-            Some(format!("{} {sign}{value} ({verdict})", row.short?))
+            let (change, verdict) = (row.written_change(own.change), own.verdict.as_str());
+            Some(format!("{} {change} ({verdict})", row.short?))
         })
         .collect();
     for (name, share, verdict) in [

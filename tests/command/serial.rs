@@ -1,12 +1,19 @@
 //! `ventriform serial`.
 
+use dicom_object::{Tag, from_reader};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 use ventriform::base::progress::Monitor;
 use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::{Provenance, Volume};
+use ventriform::results::export::dicom::{Moment, SourceScan, nuclear_image};
 use ventriform::runs::serial::FILE_NAMES;
+
+/// Current Requested Procedure Evidence Sequence, and Pertinent Other Evidence Sequence: an item for each study.
+const EVIDENCE: Tag = Tag(0x0040, 0xA375);
+const OTHER_EVIDENCE: Tag = Tag(0x0040, 0xA385);
 
 fn serial(here: &Path, arguments: &str, threads: usize) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ventriform"))
@@ -28,6 +35,21 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(file).collect()
 }
 
+/// The volume as a Nuclear Medicine Image of a study that all scans share.
+fn of_one_study(volume: &Volume) -> Vec<u8> {
+    let whose = Provenance {
+        patient_id: Some("4711".into()),
+        study_uid: Some("1.2.3".into()),
+        ..Provenance::default()
+    };
+    let made = Moment {
+        date: "20261123".into(),
+        time: "134500".into(),
+    };
+    let scan = SourceScan::new(whose, volume.frame.clone(), volume.shape, true, made);
+    nuclear_image(&scan, std::slice::from_ref(volume), None, "simulated").unwrap()
+}
+
 #[test]
 fn three_scans_become_the_same_documented_files_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
@@ -44,6 +66,8 @@ fn three_scans_become_the_same_documented_files_on_any_number_of_threads() {
         let made = phantom(&parameters, &Monitor::silent()).unwrap();
         let bytes = nifti::write(&made.volume, StoredType::Int16, false).unwrap();
         std::fs::write(here.join(format!("scan{seed}.nii")), bytes).unwrap();
+        let bytes = of_one_study(&made.volume);
+        std::fs::write(here.join(format!("scan{seed}.dcm")), bytes).unwrap();
     }
     let scans = "scan1.nii scan2.nii scan3.nii --format glb";
     let made = [1, 4].map(|threads| {
@@ -74,6 +98,19 @@ fn three_scans_become_the_same_documented_files_on_any_number_of_threads() {
     assert!(run.status.success(), "{said}");
     let objects = files(&here.join("dicom"));
     assert_eq!(&objects["measurements.dcm"][128..132], b"DICM");
+
+    // Scans of one study stay together without their identity, whatever the secret.
+    let named = "scan1.dcm scan2.dcm scan3.dcm -o nobody --dicom --deidentify";
+    let run = serial(here, named, 2);
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.status.success(), "{said}");
+    let report = &files(&here.join("nobody"))["measurements.dcm"];
+    let report = from_reader(report.as_slice()).unwrap();
+    let studies = [EVIDENCE, OTHER_EVIDENCE].map(|tag| {
+        let sequence = report.element_opt(tag).unwrap();
+        sequence.map_or(0, |sequence| sequence.items().unwrap().len())
+    });
+    assert_eq!(studies, [1, 0]);
 
     for (arguments, said) in [
         ("scan1.nii -o bad", "2"),

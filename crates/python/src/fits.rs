@@ -11,7 +11,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use ventriform::base::progress::Plan;
-use ventriform::image::volume::ReadLimits;
+use ventriform::image::volume::{Provenance, ReadLimits, VolumeError};
 use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters, SerialChoice};
 use ventriform::results::export::Part;
@@ -112,11 +112,8 @@ pub fn segment<'py>(
         let objects = objects.transpose().map_err(unordered)?;
         let (auto, models) = given.read(&parameters.mask.mesh, monitor)?;
         let normals = normals(limits_given)?;
-        let whose = stated.map(|s| objects::whose(scan, parameters.frame, &s, &limits, monitor));
-        let whose = whose
-            .transpose()
-            .map_err(|error| stopped(&error))?
-            .flatten();
+        let whose =
+            found(stated.map(|s| objects::whose(scan, parameters.frame, &s, &limits, monitor)))?;
         let order = SegmentationOrder {
             volume: scan,
             expert: expert.as_deref(),
@@ -187,11 +184,7 @@ pub fn beat<'py>(
         let formats = formats(&names)?;
         let objects = objects.map(|o| o.order_of_gates(&gates, &limits, monitor));
         let objects = objects.transpose().map_err(unordered)?;
-        let whose = stated.map(|s| objects::whose_gates(&gates, &s, &limits, monitor));
-        let whose = whose
-            .transpose()
-            .map_err(|error| stopped(&error))?
-            .flatten();
+        let whose = found(stated.map(|s| objects::whose_gates(&gates, &s, &limits, monitor)))?;
         let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = GatedOrder {
@@ -228,6 +221,14 @@ pub fn beat<'py>(
     Ok(result)
 }
 
+/// Whose scan a page names, if it names somebody.
+fn found(
+    whose: Option<Result<Option<Provenance>, VolumeError>>,
+) -> Result<Option<Provenance>, Stopped> {
+    let whose = whose.transpose().map_err(|error| stopped(&error))?;
+    Ok(whose.flatten())
+}
+
 /// Rest and stress of one patient.
 #[pyfunction]
 #[pyo3(signature = (stress, rest, order, parameters, how))]
@@ -250,11 +251,7 @@ pub fn compare<'py>(
         let formats = formats(&names)?;
         let objects = objects.map(|o| o.order_of_pair([&stress, &rest], &limits, monitor));
         let objects = objects.transpose().map_err(unordered)?;
-        let whose = stated.map(|s| objects::whose_either(&stress, &s, &limits, monitor));
-        let whose = whose
-            .transpose()
-            .map_err(|error| stopped(&error))?
-            .flatten();
+        let whose = found(stated.map(|s| objects::whose_either(&stress, &s, &limits, monitor)))?;
         let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = ComparisonOrder {
@@ -303,23 +300,11 @@ pub fn serial_comparison<'py>(
         let (objects, stated) = objects?;
         let limits = ReadLimits::default();
         let formats = formats(&names)?;
-        let ordered = |choice: &objects::ObjectChoice| {
-            let scans = scans.iter();
-            scans
-                .map(|files| choice.order_of_either(files, &limits, monitor))
-                .collect::<Result<Vec<_>, _>>()
-        };
-        let objects = objects
-            .as_ref()
-            .map(ordered)
-            .transpose()
-            .map_err(unordered)?;
+        let objects = objects.map(|o| o.order_of_scans(&scans, &limits, monitor));
+        let objects = objects.transpose().map_err(unordered)?;
         let whose = stated.zip(scans.first());
-        let whose = whose.map(|(s, first)| objects::whose_either(first, &s, &limits, monitor));
-        let whose = whose
-            .transpose()
-            .map_err(|error| stopped(&error))?
-            .flatten();
+        let whose =
+            found(whose.map(|(s, first)| objects::whose_either(first, &s, &limits, monitor)))?;
         let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = SerialOrder {
@@ -333,12 +318,8 @@ pub fn serial_comparison<'py>(
         let made = made.map_err(|error| stopped(&error))?;
         let mut files = made.files(&formats, monitor).map_err(unwritable)?;
         files.push(made.page(&files, whose.as_ref()));
-        if let Some(objects) = objects {
-            let mut objects: Vec<_> = objects.into_iter().map(Some).collect();
-            let sources: Vec<_> = (made.scans.iter())
-                .filter_map(|scan| Some(objects[scan.given - 1].take()?.of_compared(&scan.heart)))
-                .collect();
-            let objects = made.dicom_files(&sources);
+        if let Some(orders) = objects {
+            let objects = made.dicom_files(&objects::of_serial(&orders, &made));
             files.extend(objects.map_err(|error| stopped(&error))?);
         }
         Ok(named(files))

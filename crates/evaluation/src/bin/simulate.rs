@@ -235,27 +235,17 @@ fn main() -> Result<()> {
             kinds,
             gates,
             matrix,
-        } => {
-            let kind = |number: usize| &kinds[number % kinds.len()];
-            let name = |number: usize| format!("{}_{}_{number:03}", kind(number), order.seed);
-            order.make(name, &|one: &Case| {
-                let kind = kind(one.number);
-                pairs::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
-            })
-        }
+        } => two_scans(&order, &kinds, &|kind, one| {
+            pairs::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
+        }),
         What::Serial {
             order,
             kinds,
             gates,
             matrix,
-        } => {
-            let kind = |number: usize| &kinds[number % kinds.len()];
-            let name = |number: usize| format!("{}_{}_{number:03}", kind(number), order.seed);
-            order.make(name, &|one: &Case| {
-                let kind = kind(one.number);
-                serial::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
-            })
-        }
+        } => two_scans(&order, &kinds, &|kind, one| {
+            serial::write(kind, one.name, one.seed, gates, matrix, one.folder).map(drop)
+        }),
         What::Gated {
             order,
             kinds,
@@ -316,6 +306,17 @@ fn main() -> Result<()> {
                 })
         }
     }
+}
+
+/// Makes cases of two scans each, of these kinds in turn.
+fn two_scans(
+    order: &Order,
+    kinds: &[String],
+    write: &(dyn Fn(&str, &Case) -> Result<()> + Sync),
+) -> Result<()> {
+    let kind = |number: usize| &kinds[number % kinds.len()];
+    let name = |number: usize| format!("{}_{}_{number:03}", kind(number), order.seed);
+    order.make(name, &|one: &Case| write(kind(one.number), one))
 }
 
 fn cases(order: &Order, kinds: &[String], coarse: bool) -> Result<()> {

@@ -143,12 +143,7 @@ pub fn write(
             contraction: difference.contraction,
         }];
     }
-    let options = StudyOptions {
-        gates,
-        loss: 0.0,
-        height_mm: Some(HEIGHT_MM),
-        truth_images: false,
-    };
+    let options = options(gates);
     let of_stress = study::write(stress, &options, &folder.join("stress"))?;
     let of_rest = study::write(rest, &options, &folder.join("rest"))?;
     let truth = pair_truth(
@@ -161,6 +156,16 @@ pub fn write(
     );
     write_json(&folder.join("pair.json"), &truth)?;
     Ok(truth)
+}
+
+/// How each of two scans of one heart is made. `gates`: 0 for scans without.
+pub(super) fn options(gates: usize) -> StudyOptions {
+    StudyOptions {
+        gates,
+        loss: 0.0,
+        height_mm: Some(HEIGHT_MM),
+        truth_images: false,
+    }
 }
 
 /// The patient lies elsewhere, by these deviations of place and direction, with other counts in liver and gut. Out: how

@@ -7,10 +7,10 @@
 use super::draw::TERRITORIES;
 use super::files::write_json;
 use super::healthy::{Protocol, person};
-use super::pairs::{dilate, lie_down_again};
+use super::pairs::{dilate, lie_down_again, options};
 use super::parameters::{Defect, Filter, Parameters};
 use super::random::{Draws, Stream};
-use super::study::{self, StudyOptions};
+use super::study;
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -22,8 +22,6 @@ pub const KINDS: [&str; 10] = [
     "same", "filter", "grid", "ef5", "ef10", "edv20", "worse10", "worse20", "better10", "better20",
 ];
 
-/// Height of the slices that are kept, mm.
-const HEIGHT_MM: f64 = 224.0;
 /// Deviations of the place and of the direction, mm and degrees.
 const MOVED_SD: [f64; 2] = [4.5, 4.5];
 /// Uptake that a loss takes, as a share.
@@ -82,12 +80,7 @@ pub fn write(
         "better10" | "better20" => first.heart.defects.push(lost),
         _ => {}
     }
-    let options = StudyOptions {
-        gates,
-        loss: 0.0,
-        height_mm: Some(HEIGHT_MM),
-        truth_images: false,
-    };
+    let options = options(gates);
     let [of_first, of_later] = [
         study::write(first, &options, &folder.join("scan1"))?,
         study::write(later, &options, &folder.join("scan2"))?,

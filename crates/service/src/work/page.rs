@@ -87,9 +87,10 @@ pub(super) const COMPARISON_FILES: &[&str] = &[
 /// The files that [`serial_page`] reads: report and trend, the polar map of every scan that there may be, and the maps of
 /// the changes from the first scan and from scan to scan.
 pub(super) fn serial_files() -> &'static [&'static str] {
-    static NAMES: LazyLock<Vec<String>> = LazyLock::new(serial::page_files);
-    static FILES: LazyLock<Vec<&'static str>> =
-        LazyLock::new(|| NAMES.iter().map(String::as_str).collect());
+    static FILES: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+        let names = serial::page_files().into_iter();
+        names.map(|name| &*name.leak()).collect()
+    });
     &FILES
 }
 
@@ -229,10 +230,8 @@ pub(super) fn serial_page(
         let found = maps.iter().find(|(known, _)| *known == name);
         found.map(|(_, svg)| svg.as_slice())
     };
-    let first = report
-        .scans
-        .first()
-        .and_then(|scan| scans.get(scan.given - 1));
+    let first = report.scans.first();
+    let first = first.and_then(|scan| scans.get(scan.given.checked_sub(1)?));
     Ok(report::serial_page(&SerialPage {
         report: &report,
         trend: trend.as_deref(),

@@ -17,6 +17,7 @@ use crate::results::export::dicom::{
 use crate::runs::gated::GatedHeart;
 use crate::runs::rest_stress::ComparedHeart;
 use crate::runs::segmentation::SegmentedVolume;
+use crate::runs::serial::SerialHearts;
 
 /// What a caller states of DICOM objects.
 #[derive(Clone)]
@@ -97,7 +98,7 @@ impl ObjectChoice {
     ///
     /// # Errors
     /// As there.
-    pub fn order_of_either(
+    fn order_of_either(
         &self,
         files: &[VolumeFile],
         limits: &ReadLimits,
@@ -106,6 +107,22 @@ impl ObjectChoice {
         let gates = || self.order_of_gates(files, limits, monitor);
         let one = self.order(files, None, limits, monitor);
         one.or_else(|error| gates().map_err(|_| error))
+    }
+
+    /// The same of each of several scans of one patient.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn order_of_scans(
+        &self,
+        scans: &[Vec<VolumeFile>],
+        limits: &ReadLimits,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<ObjectOrder>, ObjectError> {
+        let orders = scans.iter();
+        orders
+            .map(|files| self.order_of_either(files, limits, monitor))
+            .collect()
     }
 
     /// The same of each of two scans of one patient.
@@ -197,6 +214,18 @@ impl ObjectOrder {
         let scan = heart.scan(self.identity, self.choice.made.clone());
         anonymous(scan, &self.choice)
     }
+}
+
+/// The scans that the objects of `made` belong to, in the order of its report. `orders` stand in the order in which the scans
+/// were given.
+pub fn of_serial(orders: &[ObjectOrder], made: &SerialHearts) -> Vec<SourceScan> {
+    let scans = made.scans.iter();
+    scans
+        .filter_map(|scan| {
+            let order = orders.get(scan.given.checked_sub(1)?)?;
+            Some(order.clone().of_compared(&scan.heart))
+        })
+        .collect()
 }
 
 /// The scan, without the patient's identity if that is asked for.

@@ -66,6 +66,40 @@ pub fn least_rotation(from: &Vec3, to: &Vec3) -> Option<Rotation3<f64>> {
     }
 }
 
+/// The similarity that maps points to others best, in the sense of least squares: about the mean of the ones, a turn and a
+/// scale, and then to the mean of the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointAlignment {
+    /// Mean of the points that are mapped.
+    pub from: Vec3,
+    /// Mean of those that they are mapped to.
+    pub to: Vec3,
+    /// The turn.
+    pub turn: Matrix3<f64>,
+    /// The scale.
+    pub scale: f64,
+}
+
+impl PointAlignment {
+    /// That of the points `from` to the points `to`, each to the one with its number.
+    pub fn between(from: &[Vec3], to: &[Vec3]) -> Self {
+        let mean = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len() as f64;
+        let means = (mean(from), mean(to));
+        let (mut moment, mut spread) = (Matrix3::zeros(), 0.0);
+        for (p, q) in from.iter().zip(to) {
+            moment += (q - means.1) * (p - means.0).transpose();
+            spread += (p - means.0).norm_squared();
+        }
+        let turn = nearest_rotation(&moment);
+        Self {
+            from: means.0,
+            to: means.1,
+            turn,
+            scale: (turn.transpose() * moment).trace() / spread,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

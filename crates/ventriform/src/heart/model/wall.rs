@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::base::geometry::bvh::Bvh;
 use crate::base::geometry::frame::VoxelToPatient;
-use crate::base::geometry::rotation::nearest_rotation;
+use crate::base::geometry::rotation::PointAlignment;
 use crate::base::geometry::{Vec3, triangle};
 use crate::base::progress::{Cancelled, Monitor};
 use crate::image::grid::voxelise::Mask;
@@ -117,16 +117,12 @@ pub fn turn_between(from: &Vec3, to: &Vec3, superior: &Vec3) -> Rotation3<f64> {
 /// The position of `cup` after its model has moved from `before` to `after`, by the similarity that
 /// maps the nodes best in the sense of least squares. The breadth stays.
 pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
-    let n = before.vertices.len() as f64;
-    let mean = |m: &TriMesh| m.vertices.iter().sum::<Vec3>() / n;
-    let (from, to) = (mean(before), mean(after));
-    let (mut moment, mut spread) = (Matrix3::zeros(), 0.0);
-    for (p, q) in before.vertices.iter().zip(&after.vertices) {
-        moment += (q - to) * (p - from).transpose();
-        spread += (p - from).norm_squared();
-    }
-    let turn = nearest_rotation(&moment);
-    let scale = (turn.transpose() * moment).trace() / spread;
+    let PointAlignment {
+        from,
+        to,
+        turn,
+        scale,
+    } = PointAlignment::between(&before.vertices, &after.vertices);
     Cup {
         centre: to + turn * (cup.centre - from) * scale,
         axis: (turn * cup.axis).normalize(),

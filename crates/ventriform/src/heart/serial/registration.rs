@@ -13,13 +13,13 @@
 
 use crate::base::geometry::Vec3;
 use crate::base::geometry::bvh::Aabb;
-use crate::base::geometry::rotation::nearest_rotation;
+use crate::base::geometry::rotation::PointAlignment;
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::model::wall::{RAY_COLUMNS, VentricleWall};
 use crate::image::grid::Volume;
 use crate::image::grid::field::Field;
 use crate::mesh::TriMesh;
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Rotation3;
 
 /// Blur of both images, sigma in mm: other filters and noise matter less.
 const BLUR_MM: f64 = 4.0;
@@ -52,15 +52,11 @@ impl RigidMotion {
 
     /// The motion that maps the points `from` to the points `to` best.
     pub fn between(from: &[Vec3], to: &[Vec3]) -> Self {
-        let mean = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len().max(1) as f64;
-        let (a, b) = (mean(from), mean(to));
-        let moment = (from.iter().zip(to)).fold(Matrix3::zeros(), |sum, (p, q)| {
-            sum + (q - b) * (p - a).transpose()
-        });
-        let turn = Rotation3::from_matrix_unchecked(nearest_rotation(&moment));
+        let found = PointAlignment::between(from, to);
+        let turn = Rotation3::from_matrix_unchecked(found.turn);
         Self {
             turn,
-            shift_mm: b - turn * a,
+            shift_mm: found.to - turn * found.from,
         }
     }
 

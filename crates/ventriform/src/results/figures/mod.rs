@@ -233,6 +233,11 @@ impl Figure {
         }
     }
 
+    /// A change of the figure with its digits and its sign, without its unit.
+    pub fn written_change(&self, change: f64) -> String {
+        signed(change, self.digits)
+    }
+
     /// The head of a table's column: the name with the unit.
     pub fn column(&self) -> String {
         match self.unit.symbol {

@@ -164,9 +164,9 @@ fn headlines(report: &SerialReport) -> Vec<HeadlineFigure> {
         .iter()
         .filter_map(|row| {
             let change = report.change(row.place, 1, last)?;
-            let [low, high] = change.interval.map(|end| signed(row, end));
+            let [low, high] = change.interval.map(|end| row.written_change(end));
             Some(HeadlineFigure {
-                value: signed(row, change.change),
+                value: row.written_change(change.change),
                 unit: points_of(row),
                 label: format!(
                     "{}, change; 95 %: {low} to {high}; {}",
@@ -185,11 +185,6 @@ fn headlines(report: &SerialReport) -> Vec<HeadlineFigure> {
         headlines.extend(figures::headlines(&rows.collect::<Vec<_>>(), pair));
     }
     headlines
-}
-
-/// A change of the figure of `row`, with its sign.
-fn signed(row: &Figure, change: f64) -> String {
-    crate::image::draw::text::signed(change, row.digits)
 }
 
 /// The unit of a change: points of figures in per cent.
@@ -260,12 +255,12 @@ pub(super) fn scan_table(report: &SerialReport, with_dates: bool) -> Table {
 /// What changed between two scans, and what would have shown.
 pub(super) fn change_table(report: &SerialReport, [earlier, later]: [usize; 2]) -> Table {
     let row = |row: &Figure, own: &FigureChangeReport| {
-        let [low, high] = own.interval.map(|end| signed(row, end));
+        let [low, high] = own.interval.map(|end| row.written_change(end));
         vec![
             format!("{}, {}", row.label, points_of(row))
                 .trim_end_matches(", ")
                 .to_owned(),
-            signed(row, own.change),
+            row.written_change(own.change),
             format!("{low} to {high}"),
             own.verdict.as_str().to_owned(),
             number(own.least_change, row.digits),

@@ -430,7 +430,9 @@ impl Explain for SerialError {
             SerialError::Files(_) => ((Fault::Service, "unwritable"), None, ""),
             SerialError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN),
         };
-        failure(kind, self, field, advice.into())
+        // Whoever may read a job may not see what headers say.
+        let told = failure(kind, &self.without_header_text(), field, advice.into());
+        told.or_to_sender(sentence(self))
     }
 
     fn is_cancelled(&self) -> bool {

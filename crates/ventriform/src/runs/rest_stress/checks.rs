@@ -11,7 +11,6 @@ use crate::heart::normals::Perfusion;
 use crate::image::volume::{
     Provenance, ReadLimits, ReadOptions, VolumeFile, hold_same_voxels, provenance,
 };
-use crate::runs::gated::GatedHeart;
 
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
 /// per cent for every millimetre of blur.
@@ -136,11 +135,7 @@ pub(super) fn flags(
         });
     }
     for (scan, heart) in both {
-        let of_fit = heart.segmentation().fit.judgement.flags.iter();
-        let of_beat = heart.beat().map(GatedHeart::flags).unwrap_or_default();
-        let told = of_fit
-            .map(|flag| (flag.code(), flag.to_string()))
-            .chain(of_beat.iter().map(|flag| (flag.code(), flag.to_string())));
+        let told = heart.flags().into_iter();
         flags.extend(told.map(|(code, reason)| ComparisonFlag::OfScan { scan, code, reason }));
     }
     flags.extend(of_limits(stress.perfusion(), rest.perfusion()));

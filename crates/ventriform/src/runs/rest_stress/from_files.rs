@@ -10,7 +10,7 @@ use crate::heart::normals::ScanKind;
 use crate::image::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::runs::gated::GatedOrder;
-use crate::runs::segmentation::{self, RankedTemplate, SegmentationOrder};
+use crate::runs::segmentation::{self, SegmentationOrder, common_template};
 
 /// Compares the scans of `order`. Both are fitted as beats if both are gated, as images otherwise.
 ///
@@ -40,7 +40,9 @@ pub fn from_files(
     };
     let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
     checks::refuse_fits(&stress, &rest)?;
-    if let Some(common) = common_template(&stress, &rest) {
+    let candidates = [&stress, &rest].map(|heart| heart.segmentation().candidates.as_slice());
+    let other = stress.template() != rest.template();
+    if let Some(common) = common_template(&candidates).filter(|_| other) {
         let again = |heart: ComparedHeart, which: usize| {
             if heart.template() == common {
                 return Ok(heart);
@@ -69,22 +71,6 @@ pub fn from_files(
         parameters: order.parameters.fit.clone(),
         choice: order.parameters.choice.clone(),
     })
-}
-
-/// The model in which both fits together have the greatest confidence, if they chose different ones and both can have
-/// it.
-fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<String> {
-    if stress.template() == rest.template() {
-        return None;
-    }
-    let other = &rest.segmentation().candidates;
-    let together = stress.segmentation().candidates.iter().filter_map(|own| {
-        let same = |candidate: &&RankedTemplate| candidate.name == own.name;
-        let at_rest = other.iter().find(same)?;
-        Some((own.confidence + at_rest.confidence, own.name.clone()))
-    });
-    let best = together.max_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, name)| name)
 }
 
 /// The heart of a scan, a beat if it is `gated`, by the model `kept` or else that with the greatest confidence.

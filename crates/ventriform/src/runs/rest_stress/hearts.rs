@@ -84,6 +84,16 @@ impl ComparedHeart {
         Some(self.segmentation().resolution?.value)
     }
 
+    /// Reasons to look closer at the fit, and at the beat: each by its code and in words.
+    pub(crate) fn flags(&self) -> Vec<(&'static str, String)> {
+        let of_fit = self.segmentation().fit.judgement.flags.iter();
+        let of_beat = self.beat().map(GatedHeart::flags).unwrap_or_default();
+        of_fit
+            .map(|flag| (flag.code(), flag.to_string()))
+            .chain(of_beat.iter().map(|flag| (flag.code(), flag.to_string())))
+            .collect()
+    }
+
     /// The role that the header states; `None` if it states neither rest nor stress.
     pub fn stated_role(&self) -> Option<WhichScan> {
         match self.provenance()?.rest_or_stress.as_deref()? {

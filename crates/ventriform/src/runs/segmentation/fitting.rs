@@ -103,6 +103,22 @@ pub struct RankedTemplate {
     pub evidence: Option<Evidence>,
 }
 
+/// The model in which the fits to several scans together have the greatest confidence, if all can have it; `candidates` are
+/// those of each scan.
+pub(crate) fn common_template(candidates: &[&[RankedTemplate]]) -> Option<String> {
+    let (first, others) = candidates.split_first()?;
+    let together = first.iter().filter_map(|own| {
+        let in_others = others.iter().map(|fitted| {
+            let same = fitted.iter().find(|other| other.name == own.name);
+            Some(same?.confidence)
+        });
+        let sum: f64 = in_others.sum::<Option<f64>>()?;
+        Some((own.confidence + sum, &own.name))
+    });
+    let best = together.max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, name)| name.clone())
+}
+
 /// The fits of several templates.
 #[derive(Debug, Default)]
 pub struct Trials {

@@ -55,6 +55,7 @@ pub(crate) use files::{
     csv_file, figure_files, json_file, json_line, perfusion_files, png_file, region_file, svg_file,
     uptake_files,
 };
+pub(crate) use fitting::common_template;
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};

@@ -6,9 +6,8 @@ use super::hearts::{SerialHearts, SerialScan};
 use super::order::SerialOrder;
 use crate::base::progress::Monitor;
 use crate::heart::comparison::{FEW_COUNTS_LOSS_PERCENT, Verdict};
-use crate::heart::serial::{SERIAL_FIGURES, SerialFlag};
+use crate::heart::serial::{FigureChange, SERIAL_FIGURES, SerialFlag};
 use crate::image::volume::{Provenance, ReadLimits, ReadOptions, VolumeFile, provenance};
-use crate::runs::gated::GatedHeart;
 use crate::runs::rest_stress::{FEW_MATCHED_PERCENT, RESOLUTION_MM};
 
 /// Share by which doses, and rates of the heart, have to differ to be told.
@@ -51,12 +50,11 @@ pub(super) fn refuse(headers: &Headers, same_patient: bool) -> Result<(), Serial
             if !fields.is_empty() && !same_patient {
                 return Err(SerialError::OtherPatient { scans, fields });
             }
-            if let Some((field, [first, other])) = other_kind(own, its) {
+            if let Some((field, stated)) = other_kind(own, its) {
                 return Err(SerialError::MixedKinds {
                     scans,
                     field,
-                    first,
-                    other,
+                    stated: Some(stated),
                 });
             }
         }
@@ -249,8 +247,7 @@ fn odd_scans(hearts: &SerialHearts) -> Vec<SerialFlag> {
             values.is_some_and(|v| {
                 let [to, back, over] =
                     [(0, 1), (1, 2), (0, 2)].map(|(a, b)| figure.change(v[a], v[b], noise));
-                let yes =
-                    |change: &crate::heart::serial::FigureChange| change.verdict == Verdict::Yes;
+                let yes = |change: &FigureChange| change.verdict == Verdict::Yes;
                 yes(&to) && yes(&back) && !yes(&over) && to.change * back.change < 0.0
             })
         });
@@ -264,11 +261,7 @@ fn odd_scans(hearts: &SerialHearts) -> Vec<SerialFlag> {
 
 /// Flags of the fit of the scan with that number, and of its beat.
 fn of_fit(scan: &SerialScan, number: usize) -> Vec<SerialFlag> {
-    let of_fit = scan.heart.segmentation().fit.judgement.flags.iter();
-    let of_beat = scan.heart.beat().map(GatedHeart::flags).unwrap_or_default();
-    let told = of_fit
-        .map(|flag| (flag.code(), flag.to_string()))
-        .chain(of_beat.iter().map(|flag| (flag.code(), flag.to_string())));
+    let told = scan.heart.flags().into_iter();
     let mut flags: Vec<SerialFlag> = told
         .map(|(code, reason)| SerialFlag::OfScan {
             scan: number,

@@ -70,16 +70,14 @@ pub enum SerialError {
         fields: Vec<&'static str>,
     },
     /// One scan is at rest and one at stress, or tracers or corrections differ.
-    #[error("{field} differs: {first} in scan {}, {other} in scan {}", .scans[0], .scans[1])]
+    #[error("{field} differs between scans {} and {}{}", .scans[0], .scans[1], said(.stated.as_ref()))]
     MixedKinds {
         /// Which.
         scans: [usize; 2],
         /// What differs.
         field: &'static str,
-        /// In the first of them.
-        first: String,
-        /// In the other one.
-        other: String,
+        /// What their headers say; `None` where that is not to be repeated.
+        stated: Option<[String; 2]>,
     },
     /// No wall is seen in two scans, or one has no uptake.
     #[error("no part of the wall has uptake in both of scans {} and {}", .scans[0], .scans[1])]
@@ -95,7 +93,24 @@ pub enum SerialError {
     Cancelled(#[from] Cancelled),
 }
 
+/// What two headers say, as the end of a sentence.
+fn said(stated: Option<&[String; 2]>) -> String {
+    stated.map_or_else(String::new, |[first, other]| {
+        format!(": {first} and {other}")
+    })
+}
+
 impl SerialError {
+    /// The error without text of the scans' headers.
+    #[must_use]
+    pub fn without_header_text(&self) -> Self {
+        let mut told = self.clone();
+        if let Self::MixedKinds { stated, .. } = &mut told {
+            *stated = None;
+        }
+        told
+    }
+
     pub(super) fn of_volume(scan: usize, error: VolumeError) -> Self {
         match error {
             VolumeError::Cancelled(cancelled) => Self::Cancelled(cancelled),

@@ -10,6 +10,7 @@ use crate::heart::comparison::{Change, ScoreAnswers, Sides};
 use crate::heart::model::MYOCARDIAL_DENSITY_G_PER_ML;
 use crate::heart::serial::{CommonHeart, Registration, registered};
 use crate::image::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
+use crate::runs::segmentation::common_template;
 
 /// A scan: its number as it was given, from 1, and its files.
 type Numbered<'a> = (usize, &'a [VolumeFile]);
@@ -88,7 +89,8 @@ fn fitted_alone(
         }
         fits.push(fit);
     }
-    let Some(common) = common_template(&fits) else {
+    let candidates: Vec<_> = fits.iter().map(ScanFit::candidates).collect();
+    let Some(common) = common_template(&candidates) else {
         return Ok(fits);
     };
     let quiet = monitor.without_observer();
@@ -98,21 +100,6 @@ fn fitted_alone(
         }
     }
     Ok(fits)
-}
-
-/// The model in which all fits together have the greatest confidence, if all can have it.
-fn common_template(fits: &[ScanFit]) -> Option<String> {
-    let (first, others) = fits.split_first()?;
-    let together = first.candidates().iter().filter_map(|own| {
-        let in_others = others.iter().map(|fit| {
-            let mut candidates = fit.candidates().iter();
-            Some(candidates.find(|other| other.name == own.name)?.confidence)
-        });
-        let sum: f64 = in_others.sum::<Option<f64>>()?;
-        Some((own.confidence + sum, &own.name))
-    });
-    let best = together.max_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, name)| name.clone())
 }
 
 /// The hearts registered, fitted again from the common one, with their beats.

@@ -1,5 +1,6 @@
 //! The hearts of a serial comparison.
 
+use crate::heart::beat::SegmentMotion;
 use crate::heart::comparison::{Answer, Change, ScoreAnswers};
 use crate::heart::serial::{FigureChange, Registration, SERIAL_FIGURES, SerialFlag};
 use crate::image::volume::Provenance;
@@ -75,8 +76,10 @@ impl SerialScan {
     pub fn figure(&self, place: &str) -> Option<f64> {
         let beat = self.heart.beat().map(|own| &own.beat);
         let phases = beat.filter(|beat| beat.has_phases());
-        let mean = |of: &dyn Fn(usize) -> f64, count: usize| {
-            (count > 0).then(|| (0..count).map(of).sum::<f64>() / count as f64)
+        let mean = |of: &dyn Fn(&SegmentMotion) -> f64| {
+            let segments = &beat?.segments;
+            let sum: f64 = segments.iter().map(of).sum();
+            (!segments.is_empty()).then(|| sum / segments.len() as f64)
         };
         match place {
             "ef_percent" => beat?.ef_percent,
@@ -85,14 +88,8 @@ impl SerialScan {
             "cavity_ml" => Some(self.heart.cavity_ml()),
             "mass_g" => Some(self.own_mass_g),
             "dark_percent" => Some(self.heart.map()?.extent_percent),
-            "motion_mm" => {
-                let segments = &beat?.segments;
-                mean(&|n| segments[n].motion_mm, segments.len())
-            }
-            "thickening_percent" => {
-                let segments = &beat?.segments;
-                mean(&|n| segments[n].thickening_percent, segments.len())
-            }
+            "motion_mm" => mean(&|segment| segment.motion_mm),
+            "thickening_percent" => mean(&|segment| segment.thickening_percent),
             "phase_sd_degrees" => Some(phases?.phases.sd_degrees),
             "phase_bandwidth_degrees" => Some(phases?.phases.bandwidth_degrees),
             "extent_percent" => Some(self.heart.perfusion()?.extent_percent),
