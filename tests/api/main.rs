@@ -51,6 +51,7 @@ mod postgres;
 mod proxies;
 mod quotas;
 mod readers;
+mod readings;
 mod receiver;
 mod records;
 mod refused;

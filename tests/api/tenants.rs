@@ -141,6 +141,8 @@ impl Belongings {
         let beat = a.beat("sphere").await;
         let comparison = a.comparison("sphere stress", "sphere rest").await;
         let serial = a.serial(&["sphere before", "sphere after"]).await;
+        let reading = crate::readings::stated(&text(&fit["segmentation"]));
+        let reading = a.reading(reading).await;
         let normals = a.normals("sphere").await;
         let template = format!("/v1/templates?model={model}&organ=generic");
         let template = sent(a.post(&template)).await;
@@ -164,6 +166,7 @@ impl Belongings {
                 ("beats", id_of(&beat)),
                 ("comparisons", id_of(&comparison)),
                 ("serials", id_of(&serial)),
+                ("readings", id_of(&reading)),
                 ("normals", id_of(&normals)),
                 ("templates", id_of(&template)),
                 ("readers", id_of(&reader)),
@@ -311,6 +314,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 "beats",
                 "comparisons",
                 "serials",
+                "readings",
                 "normals",
                 "templates",
                 "readers",
@@ -383,6 +387,10 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         let foreign = &theirs.ids["volumes"];
         assert_eq!(named(foreign).await, named(&nobodys(foreign)).await);
     }
+    let signed = crate::readings::stated(&theirs.ids["segmentations"]);
+    let signed = b.post("/v1/readings").json(&signed).send().await.unwrap();
+    let refused = problem(signed, 422, "invalid-field").await;
+    assert_eq!(refused["field"], "result");
     for kind in ["models", "segmentations"] {
         let copied = b.post(&format!("/v1/templates?model={}", theirs.ids[kind]));
         problem(copied.send().await.unwrap(), 422, "invalid-field").await;

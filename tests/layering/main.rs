@@ -52,7 +52,15 @@ const FORBIDDEN_CRATES: &[(&str, &[&str])] = &[
 const INTERFACE_CRATES: &[&str] = &["axum", "hyper", "reqwest", "utoipa", "sqlx", "object_store"];
 
 /// The rooms of the crate for DICOM.
-const DICOM_ROOMS: &[&str] = &["text", "values", "characters", "codec", "write", "read"];
+const DICOM_ROOMS: &[&str] = &[
+    "text",
+    "values",
+    "characters",
+    "codec",
+    "write",
+    "read",
+    "report",
+];
 
 /// The rooms of the library, in reading order: a file uses its own room, and those that stand above it. A wing is
 /// the folder of some rooms; a wing's name alone is the room of its other files.
@@ -92,6 +100,7 @@ const LIBRARY_ROOMS: &[&str] = &[
     "runs/gated",
     "runs/rest_stress",
     "runs/serial",
+    "runs/reading",
     "runs/evaluate",
     "runs/objects",
     "runs/advice",
@@ -137,6 +146,7 @@ const SERVICE_ROOMS: &[&str] = &[
     "use_cases/filing",
     "use_cases/uploads",
     "use_cases/library",
+    "use_cases/readings",
     "use_cases/pairs",
     "use_cases/rules",
     "use_cases/procedures",

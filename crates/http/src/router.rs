@@ -28,6 +28,8 @@ use crate::resources::normals::{NORMALS_SIZE, Normals};
 use crate::resources::products;
 use crate::resources::readers;
 use crate::resources::readers::{PROFILE_SIZE, Readers};
+use crate::resources::readings;
+use crate::resources::readings::Readings;
 use crate::resources::scan_erasures;
 use crate::resources::segmentations;
 use crate::resources::segmentations::Segmentations;
@@ -72,6 +74,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         collection::routes::<Beats>().to_vec(),
         collection::routes::<Comparisons>().to_vec(),
         collection::routes::<Serials>().to_vec(),
+        collection::routes::<Readings>().to_vec(),
         collection::routes::<Normals>().to_vec(),
         collection::routes::<Templates>().to_vec(),
         collection::routes::<Readers>().to_vec(),
@@ -81,11 +84,12 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Beats>(),
         products::routes::<Comparisons>(),
         products::routes::<Serials>(),
+        products::routes::<Readings>(),
         products::routes::<Normals>(),
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 44] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 45] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -104,6 +108,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(beats::create_beat).layer(upload()),
         routes!(comparisons::create_comparison).layer(upload()),
         routes!(serials::create_serial).layer(json(settings.json_limit)),
+        routes!(readings::create_reading).layer(json(settings.json_limit)),
         routes!(normals::create_normals).layer(json(NORMALS_SIZE)),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(readers::create_reader).layer(json(PROFILE_SIZE)),

@@ -173,7 +173,7 @@ export interface components {
              */
             stress_esv_ml: number;
         };
-        BeatFileName: ("mesh_ed.glb" | "mesh_ed.gltf" | "mesh_ed.stl" | "mesh_ed.ply" | "mesh_ed.obj" | "mesh_ed.vtp" | "mesh_ed.vtk" | "mesh_ed.json" | "mesh_es.glb" | "mesh_es.gltf" | "mesh_es.stl" | "mesh_es.ply" | "mesh_es.obj" | "mesh_es.vtp" | "mesh_es.vtk" | "mesh_es.json" | "beat.json" | "report.html" | "curve.svg" | "phase.svg" | "gates.csv" | "segments.csv" | "polar.svg" | "polar.json" | "polar_ed.svg" | "polar_ed.json" | "polar_es.svg" | "polar_es.json" | "polar_motion.svg" | "polar_motion.json" | "polar_thickening.svg" | "polar_thickening.json" | "polar_phase.svg" | "polar_phase.json" | "polar_z.svg" | "polar_z.png" | "polar_z.json" | "polar_score.svg" | "polar_score.png" | "polar_score.json" | "mesh.glb" | "mask_ed.dcm" | "mask_es.dcm" | "measurements.dcm") | string;
+        BeatFileName: ("mesh_ed.glb" | "mesh_ed.gltf" | "mesh_ed.stl" | "mesh_ed.ply" | "mesh_ed.obj" | "mesh_ed.vtp" | "mesh_ed.vtk" | "mesh_ed.json" | "mesh_es.glb" | "mesh_es.gltf" | "mesh_es.stl" | "mesh_es.ply" | "mesh_es.obj" | "mesh_es.vtp" | "mesh_es.vtk" | "mesh_es.json" | "beat.json" | "report.html" | "curve.svg" | "phase.svg" | "gates.csv" | "segments.csv" | "polar.svg" | "polar.json" | "polar_ed.svg" | "polar_ed.json" | "polar_es.svg" | "polar_es.json" | "polar_motion.svg" | "polar_motion.json" | "polar_thickening.svg" | "polar_thickening.json" | "polar_phase.svg" | "polar_phase.json" | "polar_z.svg" | "polar_z.png" | "polar_z.json" | "polar_score.svg" | "polar_score.png" | "polar_score.json" | "mesh.glb" | "mask_ed.dcm" | "mask_es.dcm" | "measurements.dcm" | "fhir.json") | string;
         BeatJobRequest: {
             /**
              * @description The id in the caller's own system
@@ -522,6 +522,8 @@ export interface components {
             flags: components["schemas"]["Flag"][];
             /** @description Each gate, in the mean over its width. */
             gates: components["schemas"]["GateReport"][];
+            /** @description Sentences that a reader may take over into the impression; `null` where the report was made before they existed. */
+            impression?: string[] | null;
             /** @description The file of the gates. */
             input: components["schemas"]["FileFacts"];
             long_axis?: components["schemas"]["LongAxis"] | null;
@@ -853,7 +855,7 @@ export interface components {
             volume: string;
         };
         /** @enum {string} */
-        ComparisonFileName: "mesh_stress.glb" | "mesh_stress.gltf" | "mesh_stress.stl" | "mesh_stress.ply" | "mesh_stress.obj" | "mesh_stress.vtp" | "mesh_stress.vtk" | "mesh_stress.json" | "mesh_rest.glb" | "mesh_rest.gltf" | "mesh_rest.stl" | "mesh_rest.ply" | "mesh_rest.obj" | "mesh_rest.vtp" | "mesh_rest.vtk" | "mesh_rest.json" | "comparison.json" | "report.html" | "slices.png" | "segments.csv" | "polar_stress.svg" | "polar_stress.png" | "polar_stress.json" | "polar_rest.svg" | "polar_rest.png" | "polar_rest.json" | "polar_difference.svg" | "polar_difference.png" | "polar_difference.json" | "polar_z_stress.svg" | "polar_z_stress.png" | "polar_z_stress.json" | "polar_z_rest.svg" | "polar_z_rest.png" | "polar_z_rest.json" | "polar_score_stress.svg" | "polar_score_stress.png" | "polar_score_stress.json" | "polar_score_rest.svg" | "polar_score_rest.png" | "polar_score_rest.json" | "region_stress.nii.gz" | "region_rest.nii.gz" | "measurements.dcm" | "page.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm";
+        ComparisonFileName: "mesh_stress.glb" | "mesh_stress.gltf" | "mesh_stress.stl" | "mesh_stress.ply" | "mesh_stress.obj" | "mesh_stress.vtp" | "mesh_stress.vtk" | "mesh_stress.json" | "mesh_rest.glb" | "mesh_rest.gltf" | "mesh_rest.stl" | "mesh_rest.ply" | "mesh_rest.obj" | "mesh_rest.vtp" | "mesh_rest.vtk" | "mesh_rest.json" | "comparison.json" | "report.html" | "slices.png" | "segments.csv" | "polar_stress.svg" | "polar_stress.png" | "polar_stress.json" | "polar_rest.svg" | "polar_rest.png" | "polar_rest.json" | "polar_difference.svg" | "polar_difference.png" | "polar_difference.json" | "polar_z_stress.svg" | "polar_z_stress.png" | "polar_z_stress.json" | "polar_z_rest.svg" | "polar_z_rest.png" | "polar_z_rest.json" | "polar_score_stress.svg" | "polar_score_stress.png" | "polar_score_stress.json" | "polar_score_rest.svg" | "polar_score_rest.png" | "polar_score_rest.json" | "region_stress.nii.gz" | "region_rest.nii.gz" | "measurements.dcm" | "page.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm" | "fhir.json";
         ComparisonForm: {
             /**
              * Format: binary
@@ -1206,6 +1208,8 @@ export interface components {
             fixed_verdict?: components["schemas"]["Verdict"] | null;
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
+            /** @description Sentences that a reader may take over into the impression; `null` where the report was made before they existed. */
+            impression?: string[] | null;
             /**
              * Format: double
              * @description What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest.
@@ -2368,6 +2372,8 @@ export interface components {
              * @description Place in the queue; the next job to start has 1. Only while it waits.
              */
             queue_position?: number | null;
+            /** @description The reading it wrote; only for kind `reading`. */
+            reading?: string | null;
             /**
              * Format: int64
              * @description Grows with every change; also the id of the events.
@@ -2409,6 +2415,8 @@ export interface components {
             model?: string | null;
             /** @description The normal limits it built. */
             normals?: string | null;
+            /** @description The reading it wrote. */
+            reading?: string | null;
             /** @description The report on what it made. */
             report?: string | null;
             /** @description The segmentation it made. */
@@ -4237,6 +4245,30 @@ export interface components {
              */
             time_to_peak_filling_ms: number;
         };
+        /**
+         * @description The kind of result that was read.
+         * @enum {string}
+         */
+        ReadKind: "comparison" | "segmentation" | "beat";
+        /** @description The scores of a scan, 0 (normal) to 4 (no uptake). */
+        ReadScores: {
+            /** @description The automatic ones; `null` without normal limits. */
+            automatic?: (number | null)[] | null;
+            /**
+             * Format: int32
+             * @description Their sum.
+             */
+            automatic_sum?: number | null;
+            /** @description `stress`, `rest`, or `scan` where there is one scan. */
+            scan: string;
+            /** @description Of the 17 segments, by the reader. */
+            segments: number[];
+            /**
+             * Format: int32
+             * @description Their sum, 0 to 68.
+             */
+            sum: number;
+        };
         /** @description A reader: a profile by which segmentations are drawn. */
         Reader: {
             /**
@@ -4340,6 +4372,212 @@ export interface components {
              */
             masks: number;
             offsets_mm?: components["schemas"]["ReaderOffsets"] | null;
+        };
+        /** @description A reading: what a reader states of a result. It keeps the report and the pictures that were read. */
+        Reading: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example rdg_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["ReadingLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["ReadingParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description Who read, when, and the summed scores; the reading has all. */
+            summary: components["schemas"]["ReadingSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        /** @enum {string} */
+        ReadingFileName: "reading.json" | "report.html" | "comparison.json" | "report.json" | "beat.json" | "mask.nii.gz" | "mesh.json" | "slices.png" | "polar_stress.svg" | "polar_rest.svg" | "polar_difference.svg" | "polar.svg" | "polar_motion.svg" | "polar_thickening.svg" | "polar_phase.svg" | "curve.svg" | "measurements.dcm" | "fhir.json";
+        /** @description Paths of one reading. */
+        ReadingLinks: {
+            /** @description The reading that this one replaces. */
+            amends?: string | null;
+            /** @description DICOM objects, for the archive. */
+            dicom: string[];
+            /** @description The structured report as FHIR resources. */
+            fhir: string;
+            /** @description The reading as an HTML page. */
+            page: string;
+            /** @description What was stated. */
+            report: string;
+            /** @description The result that was read. */
+            result: string;
+            /** @description This reading. */
+            self: string;
+            /** @description The volume; of a comparison that at stress. */
+            volume: string;
+        };
+        /** @description A page of readings. */
+        ReadingList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The readings, newest first. */
+            readings: components["schemas"]["Reading"][];
+        };
+        /** @description What a reader states of a result */
+        ReadingParameters: {
+            /** @description Id of the reading of the same result that this one replaces; it is kept */
+            amends?: string;
+            /**
+             * @description The impression; it must not name the patient
+             * @example No perfusion defect.
+             */
+            impression?: string;
+            /**
+             * @description What limits the study; it must not name the patient
+             * @example Gut beside the inferior wall.
+             */
+            limits?: string;
+            /**
+             * @description How good the study is for a reading
+             * @enum {string}
+             */
+            quality?: "good" | "fair" | "poor";
+            /**
+             * @description When it was read, UTC
+             * @example 2026-11-30T22:15:00Z
+             */
+            read_at?: string;
+            /**
+             * @description Who reads: a name as DICOM writes it, family name first, parts separated by ^
+             * @example Doe^Jane^^Dr.
+             */
+            reader?: string;
+            /** @description Id of the volume at rest of the comparison that is read */
+            rest?: string;
+            /** @description Scores of the 17 segments at rest */
+            rest_scores?: number[];
+            /** @description Id of the comparison, segmentation or beat that is read */
+            result?: string;
+            /** @description Scores of the 17 segments of a single scan in their order, 0 (normal) to 4 (no uptake) */
+            scores?: number[];
+            /** @description Scores of the 17 segments at stress */
+            stress_scores?: number[];
+        };
+        /** @description A reading. Everything but `scores` and `flags` is as the reader stated it. */
+        ReadingReport: {
+            /** @description Id of the reading that this one replaces. */
+            amends?: string | null;
+            /** @description Flags of the result that was read. */
+            flags: components["schemas"]["Flag"][];
+            /** @description The impression. */
+            impression?: string | null;
+            /** @description Its kind. */
+            kind: components["schemas"]["ReadKind"];
+            /** @description What limits the study. */
+            limits?: string | null;
+            /** @description `good`, `fair` or `poor`. */
+            quality?: string | null;
+            /** @description When, RFC 3339 in UTC. */
+            read_at: string;
+            /** @description Who read. */
+            reader: string;
+            /** @description Id of the result that was read. */
+            result?: string | null;
+            /** @description The scores of each scan that the reader scored. */
+            scores: components["schemas"]["ReadScores"][];
+            /**
+             * Format: int32
+             * @description What the segments' scores at stress exceed those at rest by, if both were scored.
+             */
+            sds?: number | null;
+        };
+        ReadingRequest: {
+            /** @description The newest reading of the same result, which this one replaces; it is kept */
+            amends?: string;
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The impression; it must not name the patient
+             * @example No perfusion defect.
+             */
+            impression?: string;
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            /** @description What limits the study; it must not name the patient */
+            limits?: string;
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description How good the study is: `good`, `fair` or `poor` */
+            quality?: string;
+            /**
+             * @description Who read it: family name first, parts separated by ^ as in DICOM
+             * @example Doe^Jane^^Dr.
+             */
+            reader: string;
+            /** @description Scores of the 17 segments at rest */
+            rest_scores?: number[];
+            /** @description The comparison, segmentation or beat that was read */
+            result: string;
+            /** @description Scores of the 17 segments of a single scan, 0 (normal) to 4 (no uptake) */
+            scores?: number[];
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: "measurements.dcm"[];
+            /** @description Scores of the 17 segments at stress */
+            stress_scores?: number[];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description The main statements of a reading; the report has all. */
+        ReadingSummary: {
+            /** @description Id of the reading that this one replaces. */
+            amends?: string | null;
+            /** @description `good`, `fair` or `poor`. */
+            quality?: string | null;
+            /** @description When, RFC 3339 in UTC. */
+            read_at: string;
+            /** @description Who read. */
+            reader: string;
+            /** @description Id of the result that was read. */
+            result?: string | null;
+            /**
+             * Format: int32
+             * @description Summed difference score.
+             */
+            sds?: number | null;
+            /**
+             * Format: int32
+             * @description Summed rest score.
+             */
+            srs?: number | null;
+            /**
+             * Format: int32
+             * @description Summed stress score, or that of the only scan.
+             */
+            sss?: number | null;
         };
         /** @description Whether the service can accept work. */
         Ready: {
@@ -4685,7 +4923,7 @@ export interface components {
          * @description What a key allows.
          * @enum {string}
          */
-        Scope: "read" | "submit" | "admin";
+        Scope: "read" | "submit" | "sign" | "admin";
         /** @description A segment through the beat. */
         SegmentMotionReport: {
             /**
@@ -4784,7 +5022,7 @@ export interface components {
             volume: string;
         };
         /** @enum {string} */
-        SegmentationFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "mesh_anatomical.glb" | "mesh_anatomical.gltf" | "mesh_anatomical.stl" | "mesh_anatomical.ply" | "mesh_anatomical.obj" | "mesh_anatomical.vtp" | "mesh_anatomical.vtk" | "mesh_anatomical.json" | "mesh_apparent.glb" | "mesh_apparent.gltf" | "mesh_apparent.stl" | "mesh_apparent.ply" | "mesh_apparent.obj" | "mesh_apparent.vtp" | "mesh_apparent.vtk" | "mesh_apparent.json" | "mask.nii.gz" | "mask_anatomical.nii.gz" | "mask_apparent.nii.gz" | "labels.nii.gz" | "labels.seg.nrrd" | "report.json" | "report.html" | "slices.png" | "region.nii.gz" | "projections.png" | "polar.json" | "polar.svg" | "polar.png" | "polar_z.json" | "polar_z.svg" | "polar_z.png" | "polar_score.json" | "polar_score.svg" | "polar_score.png" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm";
+        SegmentationFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "mesh_anatomical.glb" | "mesh_anatomical.gltf" | "mesh_anatomical.stl" | "mesh_anatomical.ply" | "mesh_anatomical.obj" | "mesh_anatomical.vtp" | "mesh_anatomical.vtk" | "mesh_anatomical.json" | "mesh_apparent.glb" | "mesh_apparent.gltf" | "mesh_apparent.stl" | "mesh_apparent.ply" | "mesh_apparent.obj" | "mesh_apparent.vtp" | "mesh_apparent.vtk" | "mesh_apparent.json" | "mask.nii.gz" | "mask_anatomical.nii.gz" | "mask_apparent.nii.gz" | "labels.nii.gz" | "labels.seg.nrrd" | "report.json" | "report.html" | "slices.png" | "region.nii.gz" | "projections.png" | "polar.json" | "polar.svg" | "polar.png" | "polar_z.json" | "polar_z.svg" | "polar_z.png" | "polar_score.json" | "polar_score.svg" | "polar_score.png" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "fhir.json";
         SegmentationForm: {
             /**
              * Format: binary
@@ -5134,6 +5372,8 @@ export interface components {
             fit: components["schemas"]["Fit"];
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
+            /** @description Sentences that a reader may take over into the impression; `null` where the report was made before they existed. */
+            impression?: string[] | null;
             /** @description The volume's file. */
             input: components["schemas"]["FileFacts"];
             localisation?: components["schemas"]["Localisation"] | null;
@@ -5231,7 +5471,7 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        SerialFileName: ("mesh_scan01.glb" | "mesh_scan01.gltf" | "mesh_scan01.stl" | "mesh_scan01.ply" | "mesh_scan01.obj" | "mesh_scan01.vtp" | "mesh_scan01.vtk" | "mesh_scan01.json" | "serial.json" | "report.html" | "trend.svg" | "figures.csv" | "changes.csv" | "segments.csv") | string;
+        SerialFileName: ("mesh_scan01.glb" | "mesh_scan01.gltf" | "mesh_scan01.stl" | "mesh_scan01.ply" | "mesh_scan01.obj" | "mesh_scan01.vtp" | "mesh_scan01.vtk" | "mesh_scan01.json" | "serial.json" | "report.html" | "trend.svg" | "figures.csv" | "changes.csv" | "segments.csv" | "measurements.dcm" | "fhir.json") | string;
         SerialJobRequest: {
             /**
              * @description The id in the caller's own system
@@ -5259,7 +5499,11 @@ export interface components {
              * @enum {string}
              */
             priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: "measurements.dcm"[];
             source?: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
             /**
              * @description Id of the volume
              * @example vol_9f86d081884c7d659a2feaa0c55ad015
@@ -5269,6 +5513,8 @@ export interface components {
         };
         /** @description Paths of one serial comparison. */
         SerialLinks: {
+            /** @description DICOM objects of the study of the last scan, for the archive. */
+            dicom: string[];
             /** @description The wall in the first scan, in the format that `Accept` asks for. */
             mesh: string;
             /** @description The report as an HTML page. */
@@ -5631,6 +5877,10 @@ export interface components {
             priority?: "urgent" | "routine" | "bulk";
             /** @description The scans, in any order: volumes, or the segmentations or beats of them */
             scans: string[];
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: "measurements.dcm"[];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
             webhook?: components["schemas"]["WebhookRequest"];
         };
         /** @description A scan of a series. All are fitted from one common heart. */
@@ -6908,6 +7158,8 @@ export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
 export type ProjectionsReport = components['schemas']['ProjectionsReport'];
 export type RatesReport = components['schemas']['RatesReport'];
+export type ReadKind = components['schemas']['ReadKind'];
+export type ReadScores = components['schemas']['ReadScores'];
 export type Reader = components['schemas']['Reader'];
 export type ReaderFileName = components['schemas']['ReaderFileName'];
 export type ReaderLinks = components['schemas']['ReaderLinks'];
@@ -6915,6 +7167,14 @@ export type ReaderList = components['schemas']['ReaderList'];
 export type ReaderOffsets = components['schemas']['ReaderOffsets'];
 export type ReaderProfile = components['schemas']['ReaderProfile'];
 export type ReaderSummary = components['schemas']['ReaderSummary'];
+export type Reading = components['schemas']['Reading'];
+export type ReadingFileName = components['schemas']['ReadingFileName'];
+export type ReadingLinks = components['schemas']['ReadingLinks'];
+export type ReadingList = components['schemas']['ReadingList'];
+export type ReadingParameters = components['schemas']['ReadingParameters'];
+export type ReadingReport = components['schemas']['ReadingReport'];
+export type ReadingRequest = components['schemas']['ReadingRequest'];
+export type ReadingSummary = components['schemas']['ReadingSummary'];
 export type Ready = components['schemas']['Ready'];
 export type Receipt = components['schemas']['Receipt'];
 export type ReceiptLinks = components['schemas']['ReceiptLinks'];

@@ -36,6 +36,27 @@ impl Uids {
 
 /// The identifier that belongs to `parts`.
 pub fn derived(parts: &[&[u8]]) -> String {
+    format!("2.25.{}", uuid(parts))
+}
+
+/// The same identifier as a URN (RFC 9562).
+pub fn derived_urn(parts: &[&[u8]]) -> String {
+    let digits = format!("{:032x}", uuid(parts));
+    let mut urn = "urn:uuid".to_owned();
+    for (range, before) in [
+        (0..8, ':'),
+        (8..12, '-'),
+        (12..16, '-'),
+        (16..20, '-'),
+        (20..32, '-'),
+    ] {
+        urn.push(before);
+        urn.push_str(&digits[range]);
+    }
+    urn
+}
+
+fn uuid(parts: &[&[u8]]) -> u128 {
     let mut hash = Sha256::new();
     for part in parts {
         hash.update((part.len() as u64).to_le_bytes());
@@ -46,7 +67,7 @@ pub fn derived(parts: &[&[u8]]) -> String {
     uuid.copy_from_slice(&digest[..16]);
     uuid[6] = 0x80 | uuid[6] & 0x0f;
     uuid[8] = 0x80 | uuid[8] & 0x3f;
-    format!("2.25.{}", u128::from_be_bytes(uuid))
+    u128::from_be_bytes(uuid)
 }
 
 #[cfg(test)]
@@ -60,5 +81,10 @@ mod tests {
         assert!(is_uid(&uid), "{uid}");
         assert_eq!(uid, derived(&[b"a", b"b"]));
         assert_ne!(uid, derived(&[b"ab", b""]));
+        let urn = derived_urn(&[b"a", b"b"]);
+        let digits = urn.strip_prefix("urn:uuid:").unwrap().replace('-', "");
+        let number = u128::from_str_radix(&digits, 16).unwrap();
+        assert_eq!(uid, format!("2.25.{number}"));
+        assert_eq!((urn.len(), &urn[23..24]), (45, "8"));
     }
 }

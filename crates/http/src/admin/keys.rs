@@ -108,7 +108,7 @@ pub struct NewKey {
     name: Option<String>,
     /// The acts that it allows: `read`, `submit` or `admin`.
     #[serde(default, deserialize_with = "given")]
-    #[schema(value_type = String, required = true, pattern = "^(read|submit|admin)$", example = "submit")]
+    #[schema(value_type = String, required = true, pattern = "^(read|submit|sign|admin)$", example = "submit")]
     scope: Option<ScopeName>,
     /// From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
     /// never ends.

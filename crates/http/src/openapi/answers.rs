@@ -19,6 +19,8 @@ const BEAT_REPORT: &str = "BeatReport";
 
 /// The schema of a comparison's report, which the document's frame registers.
 const COMPARISON_REPORT: &str = "ComparisonReport";
+/// The schema of a reading.
+const READING_REPORT: &str = "ReadingReport";
 /// The schema of the report of a serial comparison.
 const SERIAL_REPORT: &str = "SerialReport";
 
@@ -259,6 +261,8 @@ files! {
     BeatAnswer: "The report or the mesh", [meshes(), report_alone(BEAT_REPORT)];
     /// 200 with the report of a comparison, or its slices.
     ComparisonAnswer: "The report or the slices", [files_of(["image/png"]), report_alone(COMPARISON_REPORT)];
+    /// 200 with the reading.
+    ReadingAnswer: "The reading", [report_alone(READING_REPORT)];
     /// 200 with the report of a serial comparison, or its trend.
     SerialAnswer: "The report or the trend", [files_of(["image/svg+xml"]), report_alone(SERIAL_REPORT)];
 }

@@ -1,7 +1,8 @@
 //! Schemas of request bodies that several structs make up, or that the library reads.
 
 use crate::wire::job_fields::{
-    CohortFields, ComparisonFields, JobFields, OrderFields, SerialFields, external_id, labels,
+    CohortFields, ComparisonFields, JobFields, OrderFields, ReadingFields, SerialFields,
+    external_id, labels,
 };
 use serde_json::json;
 use std::borrow::Cow;
@@ -92,6 +93,12 @@ schemas! {
     SerialRequest, |schemas| { JobRequest::schemas(schemas) } => {
         let mut object = joined([OrderFields::schema(), SerialFields::schema()]);
         add_send_fields(&mut object, &[Resource::Serial]);
+        object
+    };
+    /// A reading to be signed.
+    ReadingRequest, |schemas| { JobRequest::schemas(schemas) } => {
+        let mut object = joined([OrderFields::schema(), ReadingFields::schema()]);
+        add_send_fields(&mut object, &[Resource::Reading]);
         object
     };
     /// Normal limits to be added or built.

@@ -31,13 +31,14 @@ mod written;
 pub use answers::{
     BeatAnswer, ComparisonAnswer, DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer,
     FileAnswer, FileProblems, HoldProblems, IdentityProblems, ListProblems, LookupProblems,
-    MeshAnswer, OriginalAnswer, PatchProblems, ReportAnswer, ReportDocumentAnswer,
+    MeshAnswer, OriginalAnswer, PatchProblems, ReadingAnswer, ReportAnswer, ReportDocumentAnswer,
     ScanErasureProblems, ScopeProblems, SegmentationAnswer, SerialAnswer, StowAnswers,
     UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
     ComparisonForm, ComparisonRequest, DicomJson, JobParameters, JobRequest, MeshDocument,
-    NormalsRequest, SegmentationForm, SerialRequest, StatedScanSchema, TagsPatch, UploadForm,
+    NormalsRequest, ReadingRequest, SegmentationForm, SerialRequest, StatedScanSchema, TagsPatch,
+    UploadForm,
 };
 pub use inputs::{
     BeatQuery, CachedHeaders, ComparisonQuery, ConditionalHeaders, ErasureHeader, EventHeader,
@@ -69,6 +70,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "beats", description = "Gated studies as one model in motion, and one request from study to beat"),
         (name = "comparisons", description = "Rest and stress of one patient"),
+        (name = "readings", description = "What readers state of results: scores, impression, name and time"),
         (name = "serials", description = "One patient over the years: several scans, compared"),
         (name = "normals", description = "Normal limits: the uptake of healthy people, which segmentations, beats and \
             comparisons are scored by"),
@@ -90,6 +92,7 @@ use utoipa::openapi::{RefOr, Required};
         ventriform::results::report::SegmentationReport,
         ventriform::results::report::BeatReport,
         ventriform::results::report::ComparisonReport,
+        ventriform::results::report::ReadingReport,
         ventriform::results::report::SerialReport,
         ventriform::heart::normals::NormalLimits,
         ventriform::heart::polar::PolarDocument,

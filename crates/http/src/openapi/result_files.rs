@@ -11,6 +11,7 @@
 use crate::resources::files::REPORT_PAGE;
 use serde_json::{Map, Value, json};
 use ventriform::results::export::dicom::DicomObject;
+use ventriform::results::export::fhir::{FHIR_FILE, FHIR_MEDIA_TYPE};
 use ventriform::results::export::{Format, seg_nrrd};
 
 /// What is known of files of a kind of result.
@@ -39,6 +40,45 @@ const WITH_STORED_SCAN: &str =
 const STORED_VENTRICLES: &str = "made on request of a left ventricle, while the volume is stored and it is known whose scan it is";
 const PAGE: &str = "The report as an HTML page, made on request; it names patient, study and series as far as the key may see them";
 const GATE: &str = "of every gate";
+const FHIR: FileRow = row(
+    FHIR_FILE,
+    "The structured report as FHIR R4: a Bundle with a DiagnosticReport and its Observations",
+    WITH_STORED_SCAN,
+);
+
+const OF_COMPARISON: &str = "of a comparison";
+const OF_SEGMENTATION: &str = "of a segmentation";
+const OF_BEAT: &str = "of a beat";
+
+const READING_FILES: &[FileRow] = &[
+    row("reading.json", "The reading", ALWAYS),
+    row(
+        REPORT_PAGE,
+        "The reading as an HTML page, made on request; it names patient, study and series as far as the key may see them",
+        ALWAYS,
+    ),
+    row("comparison.json", "The report that was read", OF_COMPARISON),
+    row("report.json", "The report that was read", OF_SEGMENTATION),
+    row("beat.json", "The report that was read", OF_BEAT),
+    row("mask.nii.gz", "The mask that was read", OF_SEGMENTATION),
+    row("mesh.json", "The mesh that was read", OF_SEGMENTATION),
+    row("slices.png", "Slices", "of a comparison or a segmentation"),
+    row("polar_stress.svg", "The polar map at stress", OF_COMPARISON),
+    row("polar_rest.svg", "The polar map at rest", OF_COMPARISON),
+    row("polar_difference.svg", "Rest less stress", OF_COMPARISON),
+    row("polar.svg", "The polar map", "of a segmentation or a beat"),
+    row("polar_motion.svg", "Motion", OF_BEAT),
+    row("polar_thickening.svg", "Thickening", OF_BEAT),
+    row("polar_phase.svg", "Phase", OF_BEAT),
+    row("curve.svg", "The volume curve", OF_BEAT),
+    row(
+        "measurements.dcm",
+        "Comprehensive 3D SR: the figures that were read, the scores and the impression, verified",
+        WITH_STORED_SCAN,
+    ),
+    FHIR,
+];
+
 const SCAN: &str = "of every scan";
 const PAIR: &str = "of every scan with the first one, and with the one before it";
 
@@ -155,6 +195,7 @@ const SEGMENTATION_FILES: &[FileRow] = &[
         "Comprehensive 3D SR: the figures of `report.json`",
         WITH_STORED_SCAN,
     ),
+    FHIR,
     row(
         "polar.dcm",
         "Secondary Capture: the polar map",
@@ -230,6 +271,7 @@ const BEAT_FILES: &[FileRow] = &[
         "Comprehensive 3D SR: the figures of `beat.json`",
         WITH_STORED_SCAN,
     ),
+    FHIR,
 ];
 
 const COMPARISON_FILES: &[FileRow] = &[
@@ -289,6 +331,7 @@ const COMPARISON_FILES: &[FileRow] = &[
         "Comprehensive 3D SR: the figures of `comparison.json`",
         WITH_STORED_SCAN,
     ),
+    FHIR,
     row(
         "page.dcm",
         "Secondary Capture: the report as one picture",
@@ -347,6 +390,12 @@ const SERIAL_FILES: &[FileRow] = &[
     ),
     row("polar_change_NN_NN.png", "The same as pixels", PAIR),
     row("polar_change_NN_NN.json", "The same as numbers", PAIR),
+    row(
+        "measurements.dcm",
+        "Comprehensive 3D SR: the figures of every scan and what changed",
+        WITH_STORED_SCAN,
+    ),
+    FHIR,
 ];
 
 const NORMALS_FILES: &[FileRow] = &[row(
@@ -371,6 +420,7 @@ fn rows_of(folder: &str) -> &'static [FileRow] {
         "beats" => BEAT_FILES,
         "comparisons" => COMPARISON_FILES,
         "serials" => SERIAL_FILES,
+        "readings" => READING_FILES,
         "normals" => NORMALS_FILES,
         "readers" => READER_FILES,
         "templates" => TEMPLATE_FILES,
@@ -509,6 +559,7 @@ fn media_type_of(name: &str) -> &'static str {
     let extension = name.rsplit('.').next().unwrap_or_default();
     match extension {
         "dcm" => DicomObject::MEDIA_TYPE,
+        "json" if name == FHIR_FILE => FHIR_MEDIA_TYPE,
         "gz" => "application/gzip",
         "nrrd" => seg_nrrd::MEDIA_TYPE,
         "html" => "text/html",
@@ -525,6 +576,12 @@ fn media_type_of(name: &str) -> &'static str {
 /// The schema of a product's file.
 fn schema_of(folder: &str, name: &str) -> Value {
     match (name, media_type_of(name)) {
+        (FHIR_FILE, _) => json!({"type": "object"}),
+        ("reading.json", _) => reference("ReadingReport"),
+        // A reading keeps the report of what was read.
+        ("report.json", _) if folder.contains("readings") => reference("SegmentationReport"),
+        ("beat.json", _) if folder.contains("readings") => reference("BeatReport"),
+        ("comparison.json", _) if folder.contains("readings") => reference("ComparisonReport"),
         ("report.json" | "beat.json" | "comparison.json" | "serial.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
         (
@@ -558,6 +615,8 @@ pub fn report_of(path: &str) -> Value {
         reference("ComparisonReport")
     } else if path.starts_with("/v1/serials") {
         reference("SerialReport")
+    } else if path.starts_with("/v1/readings") {
+        reference("ReadingReport")
     } else {
         reference("ModelReport")
     }

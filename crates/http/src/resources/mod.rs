@@ -13,6 +13,7 @@ mod named_scan;
 pub(crate) mod normals;
 pub(crate) mod products;
 pub(crate) mod readers;
+pub(crate) mod readings;
 pub(crate) mod scan_erasures;
 pub(crate) mod scan_search;
 pub(crate) mod scans;

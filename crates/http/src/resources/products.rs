@@ -174,7 +174,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     if !P::MESH_NAMES.is_empty() {
         file = file.parameters::<PartQuery>();
     }
-    if !dicom::objects(P::RESOURCE_KIND).is_empty() {
+    if !dicom::made_on_request(P::RESOURCE_KIND).is_empty() {
         file = file
             .parameters::<DeidentifyQuery>()
             .answers::<DicomProblems>();
@@ -520,7 +520,10 @@ async fn get_file<P: ProductCollection>(
     query: QueryReader,
     headers: HeaderMap,
 ) -> Answer {
-    let object = dicom::object_named(P::RESOURCE_KIND, &name);
+    let objects = dicom::made_on_request(P::RESOURCE_KIND);
+    let object = objects
+        .into_iter()
+        .find(|object| object.file_name() == name);
     let (mut part, mut deidentify) = (None, false);
     if object.is_some() || name == files::REPORT_PAGE {
         deidentify = query.all::<DeidentifyQuery>()?.deidentify.unwrap_or(false);
@@ -550,7 +553,7 @@ async fn get_file<P: ProductCollection>(
     send_object(&app, &caller.tenant, &product, object, deidentify, &headers).await
 }
 
-/// Answers with a DICOM object, which is made of the product's files and the scan of its volume.
+/// Answers with a DICOM object, or with FHIR resources, which are made of the product's files and the scan of its volume.
 async fn send_object(
     app: &App,
     tenant: &Tenant,
@@ -611,11 +614,11 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison then the one at rest, of a
-    /// serial comparison then all others.
+    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison or a reading of one then
+    /// the one at rest, of a serial comparison then all others.
     async fn sees(self, app: &App, product: &Product) -> Answer<Vec<Map<String, Value>>> {
         let field = match product.resource() {
-            Resource::Comparison => Some(REST_FIELD),
+            Resource::Comparison | Resource::Reading => Some(REST_FIELD),
             Resource::Serial => Some(OTHERS_FIELD),
             _ => None,
         };
@@ -653,7 +656,7 @@ async fn send_named(
     Err(lacks_file(product, name))
 }
 
-/// The parameter of a comparison that names the volume at rest.
+/// The parameter of a comparison, and of a reading of one, that names the volume at rest.
 const REST_FIELD: &str = "rest";
 /// The parameter of a serial comparison that names the other volumes.
 const OTHERS_FIELD: &str = "others";
@@ -677,7 +680,7 @@ fn mesh_names<P: ProductCollection>() -> impl Iterator<Item = String> {
 fn file_names<P: ProductCollection>() -> Vec<String> {
     let meshes = mesh_names::<P>();
     let others = P::FILE_NAMES.iter().map(|name| (*name).to_owned());
-    let objects = dicom::objects(P::RESOURCE_KIND).iter();
+    let objects = dicom::made_on_request(P::RESOURCE_KIND).into_iter();
     let objects = objects.map(|object| object.file_name().to_owned());
     meshes.chain(others).chain(objects).collect()
 }

@@ -7,7 +7,7 @@ use crate::openapi::{self, UploadProblems, WaitAnswers};
 use crate::resources::files;
 use crate::resources::jobs::filing;
 use crate::resources::named_scan::{add, named_scan};
-use crate::resources::products::{self, Offer, ProductCollection, body_of_product};
+use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
 use crate::wire::fields::FieldReader;
 use crate::wire::job_fields::{OrderFields, SendFields, SerialFields};
 use crate::wire::links::path_of;
@@ -44,7 +44,8 @@ impl ProductCollection for Serials {
     const REPORT_FILE: &'static str = REPORT_FILE;
     const FILE_SCHEMA: &'static str = "SerialFileName";
     const FILE_HELP: &'static str = "All meshes have the same nodes and triangles. The numbers of scans count from 01 in \
-        the order of the report.";
+        the order of the report. `measurements.dcm` and `fhir.json` are made on request; they need the scope `submit`, or \
+        `deidentify=true`.";
 }
 
 body_of_product!(
@@ -73,6 +74,8 @@ struct SerialLinks {
     page: String,
     /// The figures of all scans, drawn.
     trend: String,
+    /// DICOM objects of the study of the last scan, for the archive.
+    dicom: Vec<String>,
     /// The volumes, in the order of the request.
     volumes: Vec<String>,
 }
@@ -88,6 +91,7 @@ impl SerialLinks {
             report: format!("{itself}/report"),
             page: format!("{itself}/{}", files::REPORT_PAGE),
             trend: format!("{itself}/trend.svg"),
+            dicom: object_paths(serial),
             volumes: volumes.map(path_of).collect(),
             itself,
         }

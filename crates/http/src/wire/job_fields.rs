@@ -5,7 +5,7 @@
 use crate::wire::fields::given;
 use crate::wire::webhook_request::WebhookRequest;
 use crate::wire::words::PriorityName;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use utoipa::openapi::RefOr;
@@ -159,6 +159,94 @@ pub struct SerialFields {
     #[serde(default)]
     #[schema(value_type = SerialParameters, required = false)]
     pub parameters: Map<String, Value>,
+}
+
+/// What a reader states of a result.
+#[derive(Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReadingFields {
+    /// The comparison, segmentation or beat that was read
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(
+        required = true,
+        nullable = false,
+        pattern = "^(cmp_|seg_|bea_)[0-9a-f]{1,64}$"
+    )]
+    pub result: Option<String>,
+    /// The newest reading of the same result, which this one replaces; it is kept
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, pattern = "^(rdg_)[0-9a-f]{1,64}$")]
+    pub amends: Option<String>,
+    /// Who read it: family name first, parts separated by ^ as in DICOM
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(
+        required = true,
+        nullable = false,
+        min_length = 1,
+        max_length = 64,
+        example = "Doe^Jane^^Dr."
+    )]
+    pub reader: Option<String>,
+    /// Scores of the 17 segments of a single scan, 0 (normal) to 4 (no uptake)
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, min_items = 17, max_items = 17)]
+    pub scores: Option<Vec<u8>>,
+    /// Scores of the 17 segments at stress
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, min_items = 17, max_items = 17)]
+    pub stress_scores: Option<Vec<u8>>,
+    /// Scores of the 17 segments at rest
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, min_items = 17, max_items = 17)]
+    pub rest_scores: Option<Vec<u8>>,
+    /// How good the study is: `good`, `fair` or `poor`
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, pattern = "^(good|fair|poor)$")]
+    pub quality: Option<String>,
+    /// What limits the study; it must not name the patient
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, max_length = 1000)]
+    pub limits: Option<String>,
+    /// The impression; it must not name the patient
+    #[serde(
+        default,
+        deserialize_with = "given",
+        skip_serializing_if = "Option::is_none"
+    )]
+    #[schema(nullable = false, max_length = 4000, example = "No perfusion defect.")]
+    pub impression: Option<String>,
 }
 
 /// A cohort of which normal limits are built.

@@ -10,19 +10,22 @@ pub enum Scope {
     Read,
     /// Also upload, file jobs, cancel them and erase what its tenant stored.
     Submit,
+    /// Also sign readings.
+    Sign,
     /// Also manage keys and read the audit trail.
     Admin,
 }
 
 impl Scope {
     /// Every scope, from the narrowest.
-    pub const ALL: [Scope; 3] = [Scope::Read, Scope::Submit, Scope::Admin];
+    pub const ALL: [Scope; 4] = [Scope::Read, Scope::Submit, Scope::Sign, Scope::Admin];
 
     /// Its name on the command line, in the database and over HTTP.
     pub fn as_str(self) -> &'static str {
         match self {
             Scope::Read => "read",
             Scope::Submit => "submit",
+            Scope::Sign => "sign",
             Scope::Admin => "admin",
         }
     }
@@ -35,7 +38,7 @@ impl Scope {
 
 /// A word is not the name of a scope.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("give one of read, submit, admin")]
+#[error("give one of read, submit, sign, admin")]
 pub struct InvalidScope;
 
 impl FromStr for Scope {

@@ -90,15 +90,16 @@ pub struct StoredResult {
     pub files: StoredItem,
     /// The volume that it was made of; of a comparison that at stress.
     pub source: StoredSource,
-    /// Of a comparison, the volume at rest.
-    pub rest: Option<StoredSource>,
+    /// The other volumes: of a comparison that at rest, of a serial comparison those of the other scans in the order in
+    /// which they were given.
+    pub others: Vec<StoredSource>,
 }
 
 impl StoredResult {
     /// Bytes of the volumes of which it was made, as they are stored.
     pub fn bytes(&self) -> u64 {
-        let rest = self.rest.as_ref().map_or(0, |rest| rest.volume.bytes);
-        self.source.volume.bytes.saturating_add(rest)
+        let others = self.others.iter().map(|other| other.volume.bytes);
+        others.fold(self.source.volume.bytes, u64::saturating_add)
     }
 }
 

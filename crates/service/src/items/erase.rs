@@ -33,7 +33,7 @@ pub(super) type Doomed = BTreeMap<String, Vec<FileRecord>>;
 pub struct RetentionAges {
     /// Of volumes, counted from their last upload or use.
     pub volumes: Option<Duration>,
-    /// Of models, segmentations, beats, comparisons and serial comparisons, counted from when they were last computed.
+    /// Of models, segmentations, beats, comparisons, serial comparisons and readings, counted from when they were last computed.
     pub results: Option<Duration>,
     /// Of the records of finished jobs, counted from their end.
     pub jobs: Option<Duration>,
@@ -55,7 +55,8 @@ impl RetentionAges {
             | Resource::Segmentation
             | Resource::Beat
             | Resource::Comparison
-            | Resource::Serial => self.results,
+            | Resource::Serial
+            | Resource::Reading => self.results,
             Resource::Job => self.jobs,
             Resource::Template | Resource::Reader | Resource::Normals => None,
         }

@@ -161,23 +161,20 @@ impl Items {
         let Some(source) = self.source(tenant, product.volume.as_deref()).await? else {
             return Ok(None);
         };
-        let rest = if product.resource() == Resource::Comparison {
-            let id = product.parameters.get("rest").and_then(Value::as_str);
-            let rest = self.source(tenant, id).await?;
-            if rest.is_none() {
+        let mut others = Vec::new();
+        for id in other_volumes(&product) {
+            let Some(other) = self.source(tenant, Some(id)).await? else {
                 return Ok(None);
-            }
-            rest
-        } else {
-            None
-        };
+            };
+            others.push(other);
+        }
         let wanted = wanted(&product.item);
         let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
         Ok(Some(StoredResult {
             made_at: product.ownership.created_at,
             files: self.whole(product.item, &wanted).await?,
             source,
-            rest,
+            others,
         }))
     }
 
@@ -231,4 +228,15 @@ impl Items {
         library.sort_by(|a, b| a.id.cmp(&b.id));
         Ok(library)
     }
+}
+
+/// The ids of the other volumes whose scans the objects of a product name.
+fn other_volumes(product: &Product) -> impl Iterator<Item = &str> {
+    let field = match product.resource() {
+        Resource::Comparison | Resource::Reading => "rest",
+        Resource::Serial => "others",
+        _ => "",
+    };
+    let named = product.parameters.get(field).and_then(Value::as_str);
+    named.into_iter().flat_map(|ids| ids.split(','))
 }

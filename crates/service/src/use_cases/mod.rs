@@ -8,6 +8,7 @@ mod operation;
 mod pairs;
 pub(crate) mod procedures;
 pub mod reading;
+pub mod readings;
 pub mod results;
 mod rules;
 mod scans;

@@ -7,6 +7,7 @@
 //! | `beat` | jobs of kind `beat`: one wall in motion fitted to the gates of a volume |
 //! | `comparison` | jobs of kind `comparison`: rest and stress of one patient |
 //! | `serial` | jobs of kind `serial`: scans of one patient over the years |
+//! | `reading` | jobs of kind `reading`: what a reader states of a stored result |
 //! | `normals` | jobs of kind `normals`: normal limits of a cohort of stored volumes |
 //! | `models` | the models that jobs fit |
 //! | `limits` | normal limits, as uploaded and as jobs need them |
@@ -33,6 +34,7 @@ mod page;
 mod parameters;
 pub mod part;
 mod profile;
+pub mod reading;
 mod segmentation;
 mod serial;
 mod template;
@@ -43,6 +45,7 @@ pub use comparison::ComparisonWork;
 pub use model::ModelWork;
 pub use normals::{MOST_CASES, NormalsWork, first_volume};
 pub use page::PageError;
+pub use reading::ReadingWork;
 pub use segmentation::SegmentationWork;
 pub use serial::SerialWork;
 pub use template::TEMPLATE_BYTES;
@@ -69,12 +72,13 @@ pub struct Engine {
 impl Engine {
     /// The engine of the product; `limits` bound the volumes it reads.
     pub fn new(limits: ReadLimits) -> Self {
-        let works: [Arc<dyn Work>; 6] = [
+        let works: [Arc<dyn Work>; 7] = [
             Arc::new(ModelWork { limits }),
             Arc::new(SegmentationWork { limits }),
             Arc::new(BeatWork { limits }),
             Arc::new(ComparisonWork { limits }),
             Arc::new(SerialWork { limits }),
+            Arc::new(ReadingWork),
             Arc::new(NormalsWork { limits }),
         ];
         Self {

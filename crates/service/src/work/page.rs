@@ -1,4 +1,4 @@
-//! HTML pages of stored models, segmentations, beats, comparisons and serial comparisons.
+//! HTML pages of stored models, segmentations, beats, comparisons, serial comparisons and readings.
 //!
 //! A page consists mostly of pictures: it is ten times as large as the other files together and
 //! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
@@ -13,8 +13,9 @@ use ventriform::image::volume::Provenance;
 use ventriform::results::export::read_json::{self, ReadMeshError};
 use ventriform::results::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
-    SegmentationPage, SegmentationReport, SerialPage, SerialReport,
+    ReadingReport, SegmentationPage, SegmentationReport, SerialPage, SerialReport,
 };
+use ventriform::runs::reading::{self, READING_FILE, kept_files, report_file};
 use ventriform::runs::serial;
 
 /// Why there is no page.
@@ -92,6 +93,29 @@ pub(super) fn serial_files() -> &'static [&'static str] {
         names.map(|name| &*name.leak()).collect()
     });
     &FILES
+}
+
+/// The page of a reading, made of `reading.json` and the files that it keeps of the result.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn reading_page(
+    read: &ReadFile<'_>,
+    scans: &[Map<String, Value>],
+) -> Result<String, PageError> {
+    let stated: ReadingReport = from_json(READING_FILE, &required(read, READING_FILE)?)?;
+    let name = report_file(stated.kind);
+    let report: Map<String, Value> = from_json(name, &required(read, name)?)?;
+    let mut pictures = Vec::new();
+    for name in kept_files(stated.kind) {
+        pictures.extend(optional(read, name)?.map(|bytes| (name, bytes)));
+    }
+    let content = |wanted: &str| {
+        let found = pictures.iter().find(|(name, _)| *name == wanted);
+        found.map(|(_, bytes)| bytes.clone())
+    };
+    let scan = first(scans);
+    Ok(reading::page(&stated, &report, content, Some(&scan)))
 }
 
 /// The wall at end diastole and at end systole.

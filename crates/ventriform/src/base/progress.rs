@@ -102,6 +102,9 @@ impl Plan {
 }
 
 impl Plan {
+    /// A reading: what is stated, written beside the report.
+    pub const READING: Plan = Plan(&[(Stage::Report, 1.0)]);
+
     /// A serial comparison: every scan by itself, and again from the common heart.
     pub const SERIAL: Plan = Plan(&[
         (Stage::Read, 0.05),

@@ -19,6 +19,7 @@ mod input;
 mod kind;
 mod model;
 mod normals;
+mod reading;
 mod reconstruction;
 mod resolution;
 #[cfg(feature = "schema")]
@@ -37,6 +38,7 @@ pub use input::RawValue;
 pub use kind::Kind;
 pub use model::ModelParameters;
 pub use normals::{CohortCase, NORMALS_SPECS, NormalsChoice, NormalsParameters};
+pub use reading::{GREATEST_SCORE, READING_SPECS, ReadingParameters, SegmentScores, StudyQuality};
 pub use reconstruction::RECONSTRUCTION_SPECS;
 pub use resolution::{ResolutionChoice, ResolutionParameters};
 #[cfg(feature = "schema")]

@@ -3,7 +3,7 @@
 use super::{
     BeatChoice, BesideFit, ComparisonChoice, ComparisonParameters, FitParameters, GatedParameters,
     Kind, ModelParameters, NormalsChoice, NormalsParameters, ParameterSpec, Parameters,
-    SerialChoice, SerialParameters, WithFit,
+    ReadingParameters, SerialChoice, SerialParameters, WithFit,
 };
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -71,6 +71,18 @@ impl ToSchema for SerialParameters {
 impl PartialSchema for SerialParameters {
     fn schema() -> RefOr<Schema> {
         with_fit::<SerialChoice>()
+    }
+}
+
+impl ToSchema for ReadingParameters {
+    fn name() -> Cow<'static, str> {
+        "ReadingParameters".into()
+    }
+}
+
+impl PartialSchema for ReadingParameters {
+    fn schema() -> RefOr<Schema> {
+        object_of::<Self>("What a reader states of a result")
     }
 }
 

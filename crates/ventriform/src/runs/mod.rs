@@ -1,5 +1,5 @@
 //! The stages in order, from files to results: a model ([`pipeline`]), a segmentation, a beat ([`gated`]), rest and
-//! stress, scans over the years ([`serial`]), cohorts ([`evaluate`]); the patient and scan that DICOM objects name ([`objects`]), and the advice for an error
+//! stress, scans over the years ([`serial`]), what a reader states of a result ([`reading`]), cohorts ([`evaluate`]); the patient and scan that DICOM objects name ([`objects`]), and the advice for an error
 //! ([`advice`]).
 
 pub mod pipeline;
@@ -11,6 +11,8 @@ pub mod gated;
 pub mod rest_stress;
 
 pub mod serial;
+
+pub mod reading;
 
 pub mod evaluate;
 

@@ -91,6 +91,12 @@ const ADMIN_PATHS: [&str; 5] = [
 /// The changes by which much goes at once: they need the scope `admin`, although others on the same path do not.
 const ADMIN_CHANGES: [(Method, &str); 1] = [(Method::DELETE, "/v1/volumes")];
 
+/// The changes of what a reader signs: they need the scope `sign`.
+const SIGNED_CHANGES: [(Method, &str); 2] = [
+    (Method::POST, "/v1/readings"),
+    (Method::DELETE, "/v1/readings/{id}"),
+];
+
 /// The paths under which everything needs at least the scope `submit`: they tell whose scans are
 /// stored.
 const PATIENT_PATHS: [&str; 2] = ["/v1/volumes/{id}/identity", "/dicom-web/workitems"];
@@ -114,6 +120,9 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
     let at = |(changing, path): &(Method, &str)| changing == method && route == Some(*path);
     if ADMIN_PATHS.iter().any(below) || ADMIN_CHANGES.iter().any(at) {
         return Scope::Admin;
+    }
+    if SIGNED_CHANGES.iter().any(at) {
+        return Scope::Sign;
     }
     if method.is_safe() && !PATIENT_PATHS.iter().any(below) {
         Scope::Read
@@ -354,6 +363,9 @@ mod tests {
         assert_eq!(needs(Method::DELETE, "/v1/jobs/{id}"), Scope::Submit);
         assert_eq!(needs(Method::GET, "/v1/keys"), Scope::Admin);
         assert_eq!(needs(Method::DELETE, "/v1/keys/{id}"), Scope::Admin);
+        assert_eq!(needs(Method::POST, "/v1/readings"), Scope::Sign);
+        assert_eq!(needs(Method::DELETE, "/v1/readings/{id}"), Scope::Sign);
+        assert_eq!(needs(Method::GET, "/v1/readings/{id}"), Scope::Read);
         assert_eq!(needs(Method::GET, "/v1/audit"), Scope::Admin);
         assert_eq!(needs(Method::POST, "/v1/webhooks/secret"), Scope::Admin);
         let again = "/v1/jobs/{id}/deliveries/{delivery}/redeliver";

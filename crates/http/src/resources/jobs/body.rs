@@ -84,6 +84,8 @@ pub struct JobBody {
     comparison: Option<String>,
     /// The serial comparison it made; only for kind `serial`.
     serial: Option<String>,
+    /// The reading it wrote; only for kind `reading`.
+    reading: Option<String>,
     /// The normal limits it built; only for kind `normals`.
     normals: Option<String>,
     /// Related paths.
@@ -238,6 +240,9 @@ struct JobLinks {
     /// The serial comparison it made.
     #[serde(skip_serializing_if = "Option::is_none")]
     serial: Option<String>,
+    /// The reading it wrote.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reading: Option<String>,
     /// The normal limits it built.
     #[serde(skip_serializing_if = "Option::is_none")]
     normals: Option<String>,
@@ -274,8 +279,9 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
     };
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
     let (beat, comparison) = (made(Resource::Beat), made(Resource::Comparison));
-    let (serial, normals) = (made(Resource::Serial), made(Resource::Normals));
-    // Limits have neither mesh nor report.
+    let (serial, reading) = (made(Resource::Serial), made(Resource::Reading));
+    let normals = made(Resource::Normals);
+    // Limits have neither mesh nor report, readings no mesh.
     let shown = normals.is_none();
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
@@ -308,8 +314,9 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
             mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
             comparison: comparison.as_deref().map(path_of),
             serial: serial.as_deref().map(path_of),
+            reading: reading.as_deref().map(path_of),
             normals: normals.as_deref().map(path_of),
-            mesh: below("mesh").filter(|_| shown),
+            mesh: below("mesh").filter(|_| shown && reading.is_none()),
             report: below("report").filter(|_| shown),
         },
         id: job.id,
@@ -331,6 +338,7 @@ fn body(job: Job, scope: Scope, facts: &JobFacts) -> JobBody {
         beat,
         comparison,
         serial,
+        reading,
         normals,
     }
 }

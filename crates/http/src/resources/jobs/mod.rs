@@ -77,6 +77,10 @@ pub async fn create_job(
     let job: JobFields = body.all()?;
     let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
     let kind = job.kind.as_deref().unwrap_or("model");
+    if kind == Resource::Reading.noun() {
+        let elsewhere = "A reading is signed, not filed as any other job.";
+        return Err(Problem::invalid_field("kind", elsewhere).fix("Send it to POST /v1/readings."));
+    }
     let work = app.service.work_of(kind)?;
     if let Some(source) = job.source {
         order.source = Some(source.checked(&app, &order.tenant).await?);

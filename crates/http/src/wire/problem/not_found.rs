@@ -38,6 +38,7 @@ fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
         | Resource::Serial => {
             "Send the same volume with the same parameters again; the result gets the same id."
         }
+        Resource::Reading => "Read the result again.",
         Resource::Normals => {
             "Add the same file, or build the same cohort again; it gets the same id."
         }

@@ -15,6 +15,8 @@ pub enum Resource {
     Comparison,
     /// Scans of one patient over the years, compared.
     Serial,
+    /// What a reader states of a result.
+    Reading,
     /// Normal limits: the uptake of healthy people.
     Normals,
     /// A model of the library, tried by `model=auto`.
@@ -27,13 +29,14 @@ pub enum Resource {
 
 impl Resource {
     /// Every kind.
-    pub const ALL: [Resource; 10] = [
+    pub const ALL: [Resource; 11] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
         Resource::Comparison,
         Resource::Serial,
+        Resource::Reading,
         Resource::Normals,
         Resource::Template,
         Resource::Reader,
@@ -41,13 +44,14 @@ impl Resource {
     ];
 
     /// The kinds that have files.
-    pub const WITH_FILES: [Resource; 9] = [
+    pub const WITH_FILES: [Resource; 10] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
         Resource::Comparison,
         Resource::Serial,
+        Resource::Reading,
         Resource::Normals,
         Resource::Template,
         Resource::Reader,
@@ -62,6 +66,7 @@ impl Resource {
             Resource::Beat => "bea_",
             Resource::Comparison => "cmp_",
             Resource::Serial => "ser_",
+            Resource::Reading => "rdg_",
             Resource::Normals => "nrm_",
             Resource::Template => "tpl_",
             Resource::Reader => "rdr_",
@@ -78,6 +83,7 @@ impl Resource {
             Resource::Beat => "beat",
             Resource::Comparison => "comparison",
             Resource::Serial => "serial",
+            Resource::Reading => "reading",
             Resource::Normals => "normals",
             Resource::Template => "template",
             Resource::Reader => "reader",
@@ -94,6 +100,7 @@ impl Resource {
             Resource::Beat => "beats",
             Resource::Comparison => "comparisons",
             Resource::Serial => "serials",
+            Resource::Reading => "readings",
             Resource::Normals => "normals",
             Resource::Template => "templates",
             Resource::Reader => "readers",

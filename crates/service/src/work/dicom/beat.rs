@@ -9,7 +9,9 @@ use super::{scan, stored};
 use crate::base::records::{Failure, Product};
 use crate::items::{StoredItem, StoredResult};
 use ventriform::image::volume::ReadLimits;
-use ventriform::results::export::dicom::{BeatEnd, BeatObject, DicomBeat, EndWall, Structure};
+use ventriform::results::export::dicom::{
+    BeatEnd, BeatObject, DicomBeat, EndWall, SignedReading, Structure,
+};
 use ventriform::results::report::{BeatReport, BeatSummary};
 use ventriform::runs::advice::Explain;
 use ventriform::runs::gated::{end_mesh, gate_labels};
@@ -40,6 +42,7 @@ fn mesh_file(end: BeatEnd) -> String {
 pub fn object(
     result: &StoredResult,
     object: BeatObject,
+    reading: Option<SignedReading<'_>>,
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Vec<u8>, Failure> {
@@ -66,7 +69,8 @@ pub fn object(
         &scans,
         &report,
         &text,
-    );
+    )
+    .with_reading(reading);
     let made = match object {
         BeatObject::Mask(end) => {
             let labels = gate_labels(end.gate(&report));

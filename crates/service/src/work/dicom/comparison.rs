@@ -7,7 +7,7 @@ use crate::base::records::Failure;
 use crate::items::{StoredResult, StoredSource};
 use ventriform::image::volume::ReadLimits;
 use ventriform::results::export::dicom::{
-    ComparisonObject, DicomComparison, SourceScan, Structure,
+    ComparisonObject, DicomComparison, SignedReading, SourceScan, Structure,
 };
 use ventriform::results::report::ComparisonReport;
 use ventriform::runs::advice::Explain;
@@ -28,10 +28,11 @@ pub fn source_files(object: ComparisonObject) -> Vec<String> {
 pub fn object(
     result: &StoredResult,
     object: ComparisonObject,
+    reading: Option<SignedReading<'_>>,
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<u8>>, Failure> {
-    let rest = result.rest.as_ref();
+    let rest = result.others.first();
     let rest = rest.ok_or_else(|| broken_result(&"the volume at rest is missing"))?;
     let bytes = stored::required(&result.files, REPORT_FILE)?;
     let report: ComparisonReport = stored::report(&bytes)?;
@@ -50,7 +51,7 @@ pub fn object(
         Some((stress, rest)) => report.with_scans([stress, rest]),
         None => report,
     };
-    let comparison = DicomComparison::new(structure, &scans, &report, &text);
+    let comparison = DicomComparison::new(structure, &scans, &report, &text).with_reading(reading);
     if object == ComparisonObject::Measurements {
         return (comparison.measurements().map(Some)).map_err(|error| error.explain());
     }

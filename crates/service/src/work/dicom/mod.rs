@@ -11,6 +11,8 @@
 //! | `still` | objects of a segmentation or a model |
 //! | `beat` | objects of a beat |
 //! | `comparison` | objects of a comparison |
+//! | `serial` | the structured report of a serial comparison |
+//! | `reading` | the structured report with what a reader states |
 //!
 //! Objects are not stored: the same result, scan and secret give the same bytes, UIDs included.
 //! Slices and instances of the source are read from the kept upload. What a tenant has erased of the
@@ -18,7 +20,9 @@
 
 mod beat;
 mod comparison;
+mod reading;
 mod scan;
+mod serial;
 mod still;
 mod stored;
 
@@ -28,7 +32,11 @@ use crate::base::records::{Failure, Product, Resource};
 use crate::items::{OutputFile, StoredResult};
 use ventriform::heart::comparison::WhichScan;
 use ventriform::image::volume::ReadLimits;
-use ventriform::results::export::dicom::{BeatEnd, BeatObject, ComparisonObject, DicomObject};
+use ventriform::results::export::dicom::{
+    BeatEnd, BeatObject, ComparisonObject, DicomObject, SignedReading,
+};
+use ventriform::results::export::fhir::{FHIR_FILE, FHIR_MEDIA_TYPE, bundle};
+use ventriform::runs::advice::Explain;
 
 /// A DICOM object of a stored result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +47,12 @@ pub enum ResultObject {
     Beat(BeatObject),
     /// Of a comparison.
     Comparison(ComparisonObject),
+    /// The structured report of a serial comparison.
+    Serial,
+    /// The structured report of a result with what a reader states of it.
+    Reading,
+    /// The structured report as FHIR resources, which is no DICOM object: it cannot be sent to an archive.
+    Fhir,
 }
 
 /// Of a segmentation without polar map there is no [`DicomObject::Polar`].
@@ -73,13 +87,27 @@ const COMPARISON_OBJECTS: &[ResultObject] = &[
     ResultObject::Comparison(ComparisonObject::Difference),
 ];
 
+const SERIAL_OBJECTS: &[ResultObject] = &[ResultObject::Serial];
+
+const READING_OBJECTS: &[ResultObject] = &[ResultObject::Reading];
+
 impl ResultObject {
     /// The name of the file.
     pub fn file_name(self) -> &'static str {
         match self {
+            Self::Serial | Self::Reading => DicomObject::Measurements.file_name(),
+            Self::Fhir => FHIR_FILE,
             Self::Still(object) => object.file_name(),
             Self::Beat(object) => object.file_name(),
             Self::Comparison(object) => object.file_name(),
+        }
+    }
+
+    /// The media type of the file.
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Self::Fhir => FHIR_MEDIA_TYPE,
+            _ => DicomObject::MEDIA_TYPE,
         }
     }
 
@@ -99,6 +127,15 @@ impl ResultObject {
             Self::Still(_) => still::SOURCE_FILES.map(str::to_owned).to_vec(),
             Self::Beat(object) => beat::source_files(object, product),
             Self::Comparison(object) => comparison::source_files(object),
+            Self::Serial => vec![serial::REPORT_FILE.to_owned()],
+            Self::Reading => {
+                let files = product.files.iter();
+                files.map(|file| file.name.clone()).collect()
+            }
+            Self::Fhir => {
+                let report = structured_report(product.resource());
+                report.map_or_else(Vec::new, |report| report.source_files(product))
+            }
         }
     }
 }
@@ -110,14 +147,28 @@ pub fn objects(kind: Resource) -> &'static [ResultObject] {
         Resource::Model => MODEL_OBJECTS,
         Resource::Beat => BEAT_OBJECTS,
         Resource::Comparison => COMPARISON_OBJECTS,
+        Resource::Serial => SERIAL_OBJECTS,
+        Resource::Reading => READING_OBJECTS,
         _ => &[],
     }
+}
+
+/// The structured report of results of that kind.
+fn structured_report(kind: Resource) -> Option<ResultObject> {
+    object_named(kind, DicomObject::Measurements.file_name())
 }
 
 /// The object with that file name that is made of results of that kind.
 pub fn object_named(kind: Resource, name: &str) -> Option<ResultObject> {
     let all = objects(kind).iter();
     all.copied().find(|object| object.file_name() == name)
+}
+
+/// Everything that is made of results of that kind on request, with whose scan they are: objects, and the structured report
+/// as FHIR resources.
+pub fn made_on_request(kind: Resource) -> Vec<ResultObject> {
+    let fhir = structured_report(kind).map(|_| ResultObject::Fhir);
+    objects(kind).iter().copied().chain(fhir).collect()
 }
 
 /// The file names of all objects, each once.
@@ -152,13 +203,56 @@ pub fn object(
     limits: &ReadLimits,
 ) -> Result<Option<OutputFile>, Failure> {
     let bytes = match object {
-        ResultObject::Still(object) => still::object(result, object, secret, limits)?,
-        ResultObject::Beat(object) => Some(beat::object(result, object, secret, limits)?),
-        ResultObject::Comparison(object) => comparison::object(result, object, secret, limits)?,
+        ResultObject::Fhir => fhir(result, secret, limits)?,
+        _ => made(result, object, None, secret, limits)?,
     };
     Ok(bytes.map(|bytes| OutputFile {
         name: object.file_name().into(),
-        media_type: DicomObject::MEDIA_TYPE.into(),
+        media_type: object.media_type().into(),
         bytes,
     }))
+}
+
+/// The bytes of a DICOM object, with what a reader states if it is a structured report.
+fn made(
+    result: &StoredResult,
+    object: ResultObject,
+    reading: Option<SignedReading<'_>>,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<Option<Vec<u8>>, Failure> {
+    match object {
+        ResultObject::Still(object) => still::object(result, object, reading, secret, limits),
+        ResultObject::Beat(object) => {
+            beat::object(result, object, reading, secret, limits).map(Some)
+        }
+        ResultObject::Comparison(object) => {
+            comparison::object(result, object, reading, secret, limits)
+        }
+        ResultObject::Serial => serial::measurements(result, secret, limits),
+        ResultObject::Reading => {
+            let stated = reading::statement(result)?;
+            reading::measurements(result, &stated, secret, limits)
+        }
+        ResultObject::Fhir => Ok(None),
+    }
+}
+
+/// The structured report of a result as FHIR resources.
+fn fhir(
+    result: &StoredResult,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<Option<Vec<u8>>, Failure> {
+    let kind = Resource::from_id(&result.files.id);
+    let Some(object) = kind.and_then(structured_report) else {
+        return Ok(None);
+    };
+    let amended = match object {
+        ResultObject::Reading => reading::statement(result)?.amends.is_some(),
+        _ => false,
+    };
+    let report = made(result, object, None, secret, limits)?;
+    let bundle = report.map(|report| bundle(&report, amended)).transpose();
+    bundle.map_err(|error| error.explain())
 }

@@ -9,7 +9,7 @@ use serde_json::Value;
 use ventriform::base::progress::Monitor;
 use ventriform::image::grid::voxelise::voxelise;
 use ventriform::image::volume::ReadLimits;
-use ventriform::results::export::dicom::{DicomObject, DicomResults, Structure};
+use ventriform::results::export::dicom::{DicomObject, DicomResults, SignedReading, Structure};
 use ventriform::results::report::SegmentationReport;
 use ventriform::runs::advice::Explain;
 use ventriform::runs::segmentation::cavity;
@@ -32,6 +32,7 @@ const SLICES_FILE: &str = "slices.png";
 pub fn object(
     result: &StoredResult,
     object: DicomObject,
+    reading: Option<SignedReading<'_>>,
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<u8>>, Failure> {
@@ -91,7 +92,7 @@ pub fn object(
         .with_cavity(cavity.as_ref())
         .with_pictures(slices, polar);
     let results = match &figures {
-        Some(report) => results.with_figures(report),
+        Some(report) => results.with_figures(report).with_reading(reading),
         None => results,
     };
     results.write(object).map_err(|error| error.explain())

@@ -188,8 +188,11 @@ pub struct PolarMap {
     pub extent_percent: f64,
 }
 
+/// Segments of the wall after the American Heart Association.
+pub const SEGMENT_COUNT: usize = 17;
+
 /// Names of the segments 1 to 17.
-pub const SEGMENT_NAMES: [&str; 17] = [
+pub const SEGMENT_NAMES: [&str; SEGMENT_COUNT] = [
     "basal anterior",
     "basal anteroseptal",
     "basal inferoseptal",

@@ -30,7 +30,8 @@
 //! PLY files, `part` of JSON files; OBJ files have a group and glTF files a primitive of each part, named
 //! after it. STL files cannot hold it. [`mod@open_part`] cuts a part out as an open surface.
 //!
-//! [`mod@animated`] writes a surface in motion as GLB.
+//! [`mod@animated`] writes a surface in motion as GLB. [`dicom`] writes results as DICOM objects, [`fhir`] the structured
+//! reports among them as FHIR resources.
 //!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
@@ -38,6 +39,7 @@
 
 pub mod animated;
 pub mod dicom;
+pub mod fhir;
 mod glb;
 mod gltf;
 mod json;

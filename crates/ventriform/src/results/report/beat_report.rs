@@ -79,6 +79,9 @@ pub struct BeatReport {
     pub steps: usize,
     /// Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat.
     pub flags: Vec<RaisedFlag>,
+    /// Sentences that a reader may take over into the impression; `null` where the report was made before they existed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub impression: Option<Vec<String>>,
     /// Uptake and beat beside normal limits, if some were given.
     pub perfusion: Option<PerfusionReport>,
     /// Every parameter, defaults written out.
@@ -304,6 +307,7 @@ impl BeatReport {
             confidence: round(parts.confidence),
             steps: beat.fit.steps,
             flags: parts.flags.into_iter().chain(raised).collect(),
+            impression: None,
             perfusion: parts.perfusion,
             parameters: parts.parameters,
             input: parts.input,

@@ -96,6 +96,9 @@ pub struct ComparisonReport {
     pub rest: ComparedScan,
     /// Reasons to look closer.
     pub flags: Vec<RaisedFlag>,
+    /// Sentences that a reader may take over into the impression; `null` where the report was made before they existed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub impression: Option<Vec<String>>,
     /// Every parameter, defaults written out.
     pub parameters: Map<String, Value>,
 }

@@ -6,7 +6,8 @@
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
 //! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of
-//! a [`ComparisonReport`], [`serial_page()`] one of a [`SerialReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for
+//! a [`ComparisonReport`], [`serial_page()`] one of a [`SerialReport`], [`reading_page()`] one of what a reader states of such a
+//! report ([`ReadingReport`]). [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for
 //! viewers that show nothing else: a [`DrawnPage`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
@@ -28,6 +29,7 @@ pub mod elements;
 mod embedded;
 mod fit_report;
 pub mod header_text;
+pub mod impression;
 mod input;
 mod json_number;
 pub mod measure;
@@ -37,6 +39,8 @@ mod page_parts;
 mod perfusion_report;
 mod projections_report;
 mod raised_flag;
+mod reading_page;
+pub(crate) mod reading_report;
 mod sections;
 mod segmentation_page;
 pub(crate) mod segmentation_report;
@@ -73,6 +77,8 @@ pub use model_report::{ModelReport, ReportInput};
 pub use perfusion_report::{PerfusionReport, SegmentScore, TerritoryScore};
 pub use projections_report::{MoveReport, ProjectionsReport, UncorrectedReport, ViewReport};
 pub use raised_flag::RaisedFlag;
+pub use reading_page::{ReadingPage, reading_page};
+pub use reading_report::{ReadKind, ReadScores, ReadingReport, ReadingSummary};
 pub use sections::{
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,
     OptimiseReport, Program, RetileReport, StartSummary, SurfaceReport,

@@ -70,6 +70,9 @@ pub struct SegmentationReport {
     pub projections: Option<ProjectionsReport>,
     /// Reasons to look closer.
     pub flags: Vec<RaisedFlag>,
+    /// Sentences that a reader may take over into the impression; `null` where the report was made before they existed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub impression: Option<Vec<String>>,
     /// Which voxels the mask holds.
     pub mask_rule: String,
     /// Every parameter, defaults written out.
@@ -239,6 +242,7 @@ impl SegmentationReport {
             flags: (judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),
+            impression: None,
             mask_rule: "a voxel belongs to the mask if its centre lies inside the surface".into(),
             parameters: parts.parameters,
             input: parts.input,

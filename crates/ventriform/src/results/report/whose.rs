@@ -138,7 +138,7 @@ fn joined<const N: usize>(fields: [Option<String>; N]) -> Option<String> {
 
 /// A person's name as people write it: the family's name first, a comma, the others (DICOM separates by `^`, and
 /// writings of one name by `=`).
-fn person(name: &str) -> String {
+pub(super) fn person(name: &str) -> String {
     let writing = |writing: &str| {
         let parts = writing.split('^').map(str::trim);
         let mut parts = parts.filter(|part| !part.is_empty());

@@ -29,6 +29,7 @@ use crate::runs::evaluate::normals::BuildError;
 use crate::runs::gated::GatedError;
 use crate::runs::objects::ObjectError;
 use crate::runs::pipeline::PipelineError;
+use crate::runs::reading::ReadingError;
 use crate::runs::rest_stress::ComparisonError;
 use crate::runs::segmentation::SegmentationError;
 use crate::runs::serial::SerialError;
@@ -691,6 +692,31 @@ impl Explain for ObjectError {
     }
 }
 
+impl Explain for ReadingError {
+    fn explain(&self) -> Failure {
+        match self {
+            Self::Missing { field } => failure(
+                (Fault::Request, "invalid-field"),
+                self,
+                Some(field),
+                format!("Give `{field}`."),
+            ),
+            Self::NoPlace { field, .. } => failure(
+                (Fault::Request, "invalid-field"),
+                self,
+                Some(field),
+                "Give `scores` of a single scan, `stress_scores` and `rest_scores` of a comparison.".into(),
+            ),
+            Self::Report(_) => failure(
+                (Fault::Service, "unreadable"),
+                self,
+                None,
+                "Make the result again.".into(),
+            ),
+        }
+    }
+}
+
 impl Explain for DicomError {
     fn explain(&self) -> Failure {
         let (kind, field, advice) = match self {
@@ -726,7 +752,10 @@ impl Explain for DicomError {
                 Some("model"),
                 "Use a model with fewer points.".into(),
             ),
-            DicomError::TooLarge | DicomError::Picture { .. } | DicomError::Encoding(_) => (
+            DicomError::TooLarge
+            | DicomError::Picture { .. }
+            | DicomError::Encoding(_)
+            | DicomError::Report(_) => (
                 (Fault::Content, "not-exportable"),
                 None,
                 "Use the other files of the result, which hold the same.".into(),

@@ -18,6 +18,7 @@ use crate::results::export::dicom::{
 };
 use crate::results::export::{self, Format, Metadata};
 use crate::results::report::{self, BeatPage, BeatReport};
+use crate::runs::segmentation::fhir_beside;
 use crate::runs::segmentation::{
     NamedFile, SegmentationFilesError, csv_file, json_file, json_line, perfusion_files, svg_file,
 };
@@ -238,7 +239,7 @@ impl GatedHeart {
                 .expect("a silent monitor is never cancelled");
             EndWall { wall, cavity, mesh }
         };
-        BeatObject::ALL
+        let files: Result<Vec<NamedFile>, DicomError> = BeatObject::ALL
             .into_iter()
             .map(|object| {
                 let bytes = match object {
@@ -251,7 +252,10 @@ impl GatedHeart {
                     bytes: bytes?,
                 })
             })
-            .collect()
+            .collect();
+        let mut files = files?;
+        fhir_beside(&mut files)?;
+        Ok(files)
     }
 
     /// The gate at that end, from 0.

@@ -16,6 +16,7 @@ use crate::mesh::TriMesh;
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::results::report::{
     BeatParts, BeatReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
+    impression,
 };
 use crate::runs::segmentation::{
     MadeOfSlices, Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare,
@@ -276,6 +277,8 @@ impl GatedHeart {
             perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
                 .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
         };
-        BeatReport::new(&self.beat, parts)
+        let mut report = BeatReport::new(&self.beat, parts);
+        report.impression = Some(impression::of_beat(&report));
+        report
     }
 }

@@ -12,6 +12,7 @@ use crate::results::export::dicom::{
 };
 use crate::results::export::{self, Format};
 use crate::results::report::{self, ComparisonPage, ComparisonReport};
+use crate::runs::segmentation::fhir_beside;
 use crate::runs::segmentation::{
     NamedFile, SegmentationFilesError, csv_file, figure_files, json_file, json_line,
     perfusion_files, png_file, region_file, uptake_files,
@@ -128,6 +129,7 @@ impl ComparedHearts {
                 bytes,
             });
         }
+        fhir_beside(&mut objects)?;
         Ok(objects)
     }
 

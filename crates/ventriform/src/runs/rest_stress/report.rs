@@ -6,6 +6,7 @@ use crate::heart::comparison::{Answer, WhichScan};
 use crate::heart::normals::{Perfusion, summed_percent};
 use crate::heart::polar::{PolarMap, PolarSummary};
 use crate::image::volume::{HeldGates, Provenance};
+use crate::results::report::impression;
 use crate::results::report::{
     BeatChange, BeatReport, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport,
     ComparisonReport, FileFacts, LongAxis, NoBeat, PerfusionReport, Posture, RaisedFlag,
@@ -111,7 +112,7 @@ pub(super) fn comparison_report(
     let of_scan = |scan: usize| scores.map(|own| [own.extent[scan], own.deficit[scan]]);
     let oriented = map.is_some_and(PolarMap::is_oriented);
     let territories = change.territories.iter().filter(|_| oriented);
-    ComparisonReport {
+    let mut report = ComparisonReport {
         tid: round(hearts.tid()),
         tid_interval: Some(ends(&tid)),
         tid_verdict: Some(tid.verdict),
@@ -168,6 +169,9 @@ pub(super) fn comparison_report(
         flags: (hearts.flags.iter())
             .map(|flag| RaisedFlag::new(flag.code(), flag))
             .collect(),
+        impression: None,
         parameters,
-    }
+    };
+    report.impression = Some(impression::of_comparison(&report));
+    report
 }

@@ -19,6 +19,7 @@ use crate::mesh::part::Part;
 use crate::results::export::dicom::{
     DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure,
 };
+use crate::results::export::fhir;
 use crate::results::export::open_part::open_part;
 use crate::results::export::{self, ExportError, Format, Metadata, VertexField, seg_nrrd};
 use crate::results::report::{self, SegmentationPage, SegmentationSummary};
@@ -306,6 +307,7 @@ impl SegmentedVolume {
                 });
             }
         }
+        fhir_beside(&mut files)?;
         Ok(files)
     }
 
@@ -517,6 +519,20 @@ pub(crate) fn png_file(name: &str, bytes: Vec<u8>) -> NamedFile {
         media_type: "image/png",
         bytes,
     }
+}
+
+/// Adds the structured report among DICOM objects as FHIR resources.
+pub(crate) fn fhir_beside(objects: &mut Vec<NamedFile>) -> Result<(), DicomError> {
+    let report = DicomObject::Measurements.file_name();
+    if let Some(report) = objects.iter().find(|file| file.name == report) {
+        let bytes = fhir::bundle(&report.bytes, false)?;
+        objects.push(NamedFile {
+            name: fhir::FHIR_FILE.into(),
+            media_type: fhir::FHIR_MEDIA_TYPE,
+            bytes,
+        });
+    }
+    Ok(())
 }
 
 /// A document as JSON in one line.

@@ -52,8 +52,8 @@ pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
 pub(crate) use files::{
-    csv_file, figure_files, json_file, json_line, perfusion_files, png_file, region_file, svg_file,
-    uptake_files,
+    csv_file, fhir_beside, figure_files, json_file, json_line, perfusion_files, png_file,
+    region_file, svg_file, uptake_files,
 };
 pub(crate) use fitting::common_template;
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};

@@ -7,7 +7,7 @@ use crate::heart::polar::{PolarMap, PolarSummary};
 use crate::parameters::Parameters;
 use crate::results::report::{
     AgreementReport, AppliedReaderReport, CandidateReport, FileFacts, PerfusionReport,
-    RefusedTemplateReport, Resolution, SegmentationParts, SegmentationReport,
+    RefusedTemplateReport, Resolution, SegmentationParts, SegmentationReport, impression,
 };
 
 impl SegmentedVolume {
@@ -46,7 +46,10 @@ impl SegmentedVolume {
             input: FileFacts::from_facts(&self.reading.facts),
             warnings: self.warnings(),
         };
-        SegmentationReport::new(&segmentation.fit, parts)
+        let mut report = SegmentationReport::new(&segmentation.fit, parts);
+        let said = impression::of_segmentation(&report);
+        report.impression = (!said.is_empty()).then_some(said);
+        report
     }
 
     /// The map's summary, with a note on attenuation where no normal limits stand beside it.

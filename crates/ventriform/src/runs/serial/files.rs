@@ -11,6 +11,7 @@ use crate::results::export::{self, Format};
 use crate::results::figures::readable;
 use crate::results::figures::serial::{SCAN_FIGURES, SEGMENT_FIGURES};
 use crate::results::report::{self, SerialPage, SerialReport};
+use crate::runs::segmentation::fhir_beside;
 use crate::runs::segmentation::{
     NamedFile, SegmentationFilesError, csv_file, figure_files, json_file, json_line, region_file,
     svg_file, uptake_files,
@@ -115,7 +116,9 @@ impl SerialHearts {
             media_type: DicomObject::MEDIA_TYPE,
             bytes,
         };
-        Ok(made.map(file).into_iter().collect())
+        let mut files = made.map(file).into_iter().collect();
+        fhir_beside(&mut files)?;
+        Ok(files)
     }
 }
 

@@ -12,7 +12,9 @@
 
 use super::normals;
 use super::structured_report::{self as sr, RANGES_COMMENT, WALL_SEGMENTS, measured};
-use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
+use super::{
+    DicomError, DicomObject, DicomResults, SignedReading, SourceScan, Structure, put_facts, reading,
+};
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
 use crate::results::figures::beat::{FIGURES, SEGMENT_FIGURES};
@@ -108,6 +110,7 @@ pub struct DicomBeat<'a> {
     report: &'a BeatReport,
     /// The report as JSON in one line, from which UIDs are derived.
     text: &'a str,
+    reading: Option<SignedReading<'a>>,
 }
 
 impl<'a> DicomBeat<'a> {
@@ -124,7 +127,14 @@ impl<'a> DicomBeat<'a> {
             scans,
             report,
             text,
+            reading: None,
         }
+    }
+
+    /// Adds what a reader states, to [`BeatObject::Measurements`].
+    #[must_use]
+    pub fn with_reading(self, reading: Option<SignedReading<'a>>) -> Self {
+        Self { reading, ..self }
     }
 
     /// The bytes of [`BeatObject::Mask`].
@@ -155,12 +165,16 @@ impl<'a> DicomBeat<'a> {
             add(self.text.as_bytes());
         });
         let mut set = DataSet::new();
-        sr::put(&scans, self.structure, self.groups(&uids), &[], &mut set);
+        let mut groups = self.groups(&uids);
+        groups.extend((self.reading.iter()).flat_map(|reading| reading.groups(self.structure)));
+        let signature = self.reading.map(|reading| reading.signature(scans[0]));
+        sr::put(&scans, self.structure, groups, &[], signature, &mut set);
         let name = BeatObject::Measurements.file_name();
         put_facts(
             scans[0],
             &DicomObject::Measurements.facts(),
-            [uids.uid(name), uids.uid(&format!("series of {name}"))],
+            [name.to_owned(), format!("series of {name}")]
+                .map(|name| reading::uid(&uids, &name, self.reading)),
             format!("{}: measurements of the beat", self.structure.label),
             &mut set,
         );

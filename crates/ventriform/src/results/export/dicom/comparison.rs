@@ -14,7 +14,10 @@
 
 use super::normals::{limits_used, patient_state};
 use super::structured_report::{self as sr, WALL_SEGMENTS, measured, verdicts};
-use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
+use super::{
+    DicomError, DicomObject, ObjectFacts, SignedReading, SourceScan, Structure, capture, put_facts,
+    reading,
+};
 use crate::heart::comparison::WhichScan;
 use crate::image::draw::Image;
 use crate::results::figures::comparison::{
@@ -128,6 +131,7 @@ pub struct DicomComparison<'a> {
     /// The scan at stress and the scan at rest.
     scans: &'a [SourceScan; 2],
     report: &'a ComparisonReport,
+    reading: Option<SignedReading<'a>>,
     uids: Uids,
 }
 
@@ -150,8 +154,15 @@ impl<'a> DicomComparison<'a> {
             structure,
             scans,
             report,
+            reading: None,
             uids,
         }
+    }
+
+    /// Adds what a reader states, to [`ComparisonObject::Measurements`].
+    #[must_use]
+    pub fn with_reading(self, reading: Option<SignedReading<'a>>) -> Self {
+        Self { reading, ..self }
     }
 
     /// The bytes of [`ComparisonObject::Measurements`].
@@ -162,13 +173,18 @@ impl<'a> DicomComparison<'a> {
         self.check()?;
         let mut set = DataSet::new();
         let scans = self.scans.each_ref();
-        sr::put(&scans, self.structure, self.groups(), &[], &mut set);
-        let name = ComparisonObject::Measurements.file_name();
-        self.put(
-            ComparisonObject::Measurements,
-            self.uids.uid(name),
+        let signature = self.reading.map(|reading| reading.signature(scans[0]));
+        sr::put(
+            &scans,
+            self.structure,
+            self.groups(),
+            &[],
+            signature,
             &mut set,
         );
+        let name = ComparisonObject::Measurements.file_name();
+        let instance = reading::uid(&self.uids, name, self.reading);
+        self.put(ComparisonObject::Measurements, instance, &mut set);
         Ok(set.file()?)
     }
 
@@ -241,7 +257,8 @@ impl<'a> DicomComparison<'a> {
 
     fn put(&self, object: ComparisonObject, instance: String, set: &mut DataSet) {
         let facts = object.facts();
-        let series = self.uids.uid(&format!("series of {}", facts.name));
+        let series = format!("series of {}", facts.name);
+        let series = reading::uid(&self.uids, &series, self.reading);
         let what = match object {
             ComparisonObject::Measurements => "measurements of rest and stress",
             _ => facts.description,
@@ -308,6 +325,7 @@ impl<'a> DicomComparison<'a> {
                 groups.push(group("1501", content));
             }
         }
+        groups.extend((self.reading.iter()).flat_map(|reading| reading.groups(self.structure)));
         groups
     }
 

@@ -85,6 +85,9 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
         results.structure,
         groups(results),
         &[mask],
+        results
+            .reading
+            .map(|reading| reading.signature(results.scan)),
         set,
     );
 }
@@ -119,6 +122,7 @@ fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
             .into_iter()
             .flat_map(|perfusion| normals::groups(perfusion, results.structure, &results.uids)),
     );
+    groups.extend((results.reading.iter()).flat_map(|reading| reading.groups(results.structure)));
     groups
 }
 

@@ -34,6 +34,7 @@ mod comparison;
 mod measurements;
 mod normals;
 mod nuclear;
+mod reading;
 mod segmentation;
 mod serial;
 mod source;
@@ -50,6 +51,7 @@ pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use comparison::{ComparisonObject, DicomComparison};
 pub use nuclear::{nuclear_image, nuclear_projections};
+pub use reading::SignedReading;
 pub use serial::DicomSerial;
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use ventriform_dicom::write::data_set::{
@@ -64,6 +66,7 @@ use crate::mesh::TriMesh;
 use crate::results::report::{
     DrawnPage, SegmentationReport, SegmentationSheet, segmentation_sheet,
 };
+use ventriform_dicom::report::ReportError;
 use ventriform_dicom::write::EncodingError;
 use ventriform_dicom::write::code::Code;
 use ventriform_dicom::write::data_set::DataSet;
@@ -126,6 +129,9 @@ pub enum DicomError {
     /// The data set cannot be encoded.
     #[error(transparent)]
     Encoding(#[from] EncodingError),
+    /// A structured report cannot be read again.
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
 /// An object for the archive.
@@ -254,6 +260,7 @@ pub struct DicomResults<'a> {
     mask: &'a Mask,
     mesh: &'a TriMesh,
     figures: Option<&'a SegmentationReport>,
+    reading: Option<SignedReading<'a>>,
     cavity: Option<&'a Mask>,
     slices: Option<&'a [u8]>,
     polar: Option<&'a [u8]>,
@@ -278,6 +285,7 @@ impl<'a> DicomResults<'a> {
             mask,
             mesh,
             figures: None,
+            reading: None,
             cavity: None,
             slices: None,
             polar: None,
@@ -303,6 +311,12 @@ impl<'a> DicomResults<'a> {
             figures: Some(report),
             ..self
         }
+    }
+
+    /// Adds what a reader states, to [`DicomObject::Measurements`].
+    #[must_use]
+    pub fn with_reading(self, reading: Option<SignedReading<'a>>) -> Self {
+        Self { reading, ..self }
     }
 
     /// Adds a ventricle's cavity: voxels of the mask's grid that are not of the mask.
@@ -443,13 +457,20 @@ impl<'a> DicomResults<'a> {
             .filter(|_| object == DicomObject::Mask)
             .map(|mask| mask.voxels.iter().map(|v| u8::from(*v)).collect());
         let pixels = picture.map(|picture| picture.image.pixels.as_flattened());
-        let content = cavity.as_deref().or(pixels);
+        let signature = self.signature(object).map(|reading| reading.id.as_bytes());
+        let content = cavity.as_deref().or(pixels).or(signature);
         self.uids
             .over(object.file_name(), content.unwrap_or_default())
     }
 
     fn series(&self, object: DicomObject) -> String {
-        self.uids.uid(&format!("series of {}", object.file_name()))
+        let name = format!("series of {}", object.file_name());
+        reading::uid(&self.uids, &name, self.signature(object))
+    }
+
+    /// The reading that an object states.
+    fn signature(&self, object: DicomObject) -> Option<SignedReading<'a>> {
+        self.reading.filter(|_| object == DicomObject::Measurements)
     }
 
     /// Tracking UID of the structure.

@@ -63,7 +63,7 @@ impl<'a> DicomSerial<'a> {
         };
         let mut set = DataSet::new();
         let scans: Vec<&SourceScan> = self.scans.iter().collect();
-        sr::put(&scans, self.structure, self.groups(), &[], &mut set);
+        sr::put(&scans, self.structure, self.groups(), &[], None, &mut set);
         let facts = DicomObject::Measurements.facts();
         let [instance, series] = [facts.name.to_owned(), format!("series of {}", facts.name)]
             .map(|name| self.uids.uid(&name));

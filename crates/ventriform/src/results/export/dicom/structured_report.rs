@@ -55,13 +55,22 @@ pub(super) struct SeriesReference {
     pub instance: String,
 }
 
-/// Puts everything that is particular to a report on `scans` with these measurement groups. The report and `others`
-/// belong to the study of the first.
+/// What a reader adds to a report.
+pub(super) struct Signature {
+    /// The item of the Verifying Observer Sequence.
+    pub observer: DataSet,
+    /// The container of qualitative evaluations.
+    pub evaluations: Option<DataSet>,
+}
+
+/// Puts everything that is particular to a report on `scans` with these measurement groups, and what a reader adds. The
+/// report and `others` belong to the study of the first.
 pub(super) fn put(
     scans: &[&SourceScan],
     structure: Structure,
     groups: Vec<DataSet>,
     others: &[SeriesReference],
+    signature: Option<Signature>,
     set: &mut DataSet,
 ) {
     scans[0].put_made(set);
@@ -73,6 +82,12 @@ pub(super) fn put(
     set.text(tags::PRELIMINARY_FLAG, "PRELIMINARY");
     set.text(tags::COMPLETION_FLAG, "COMPLETE");
     set.text(tags::VERIFICATION_FLAG, "UNVERIFIED");
+    let evaluations = signature.and_then(|signature| {
+        set.text(tags::PRELIMINARY_FLAG, "FINAL");
+        set.text(tags::VERIFICATION_FLAG, "VERIFIED");
+        set.item(tags::VERIFYING_OBSERVER_SEQUENCE, signature.observer);
+        signature.evaluations
+    });
     let mut own = Vec::new();
     let mut of_other_studies = Vec::new();
     for (study, evidence) in evidence(scans, others) {
@@ -104,6 +119,7 @@ pub(super) fn put(
     let mut content = context(structure);
     content.extend(image_library(scans));
     content.push(container(dcm("126010", "Imaging Measurements"), groups));
+    content.extend(evaluations);
     set.items(tags::CONTENT_SEQUENCE, content);
 }
 

@@ -1,0 +1,64 @@
+//! The structured report of a result with what a reader states of it, from the files that the reading keeps.
+
+use super::super::failures::broken_result;
+use super::{ResultObject, stored};
+use crate::base::records::{Failure, Resource};
+use crate::items::{StoredItem, StoredResult};
+use serde_json::Value;
+use ventriform::image::volume::ReadLimits;
+use ventriform::results::export::dicom::{
+    BeatObject, ComparisonObject, DicomObject, SignedReading,
+};
+use ventriform::results::report::{ReadKind, ReadingReport};
+use ventriform::runs::reading::{READING_FILE, report_file};
+
+/// The object of the result to which a reading of that kind is added.
+pub fn unread(kind: ReadKind) -> ResultObject {
+    match kind {
+        ReadKind::Comparison => ResultObject::Comparison(ComparisonObject::Measurements),
+        ReadKind::Segmentation => ResultObject::Still(DicomObject::Measurements),
+        ReadKind::Beat => ResultObject::Beat(BeatObject::Measurements),
+    }
+}
+
+/// What a reading states.
+///
+/// # Errors
+/// If its file is missing or damaged.
+pub fn statement(reading: &StoredResult) -> Result<ReadingReport, Failure> {
+    stored::report(&stored::required(&reading.files, READING_FILE)?)
+}
+
+/// The bytes of the structured report.
+///
+/// # Errors
+/// As [`super::object`].
+pub fn measurements(
+    reading: &StoredResult,
+    stated: &ReadingReport,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<Option<Vec<u8>>, Failure> {
+    let id = stated.result.clone().unwrap_or_default();
+    let report = stored::required(&reading.files, report_file(stated.kind))?;
+    let report: Value = stored::report(&report)?;
+    let parameters = report.get("parameters").and_then(Value::as_object);
+    let parameters = parameters.cloned().unwrap_or_default();
+    if Resource::from_id(&id).is_none() {
+        return Err(broken_result(&"the reading does not say what was read"));
+    }
+    // The files that the reading keeps are those of the result that was read.
+    let result = StoredResult {
+        files: StoredItem {
+            id,
+            parameters,
+            ..reading.files.clone()
+        },
+        ..reading.clone()
+    };
+    let signed = SignedReading {
+        id: &reading.files.id,
+        reading: stated,
+    };
+    super::made(&result, unread(stated.kind), Some(signed), secret, limits)
+}
