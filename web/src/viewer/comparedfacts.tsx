@@ -72,12 +72,12 @@ export function BothMeasures({ report }: { report: ComparisonReport }) {
 }
 
 /** Whether both scans should not be compared at all: that is said before any figure. */
-export function areNotComparable(report: ComparisonReport): boolean {
-  return report.flags.some(flag => flag.code === "not_comparable");
+export function areNotComparable({ flags }: Pick<ComparisonReport, "flags">): boolean {
+  return flags.some(flag => flag.code === "not_comparable");
 }
 
 /** Reasons to look closer, in words. */
-export function Reasons({ report }: { report: ComparisonReport }) {
+export function Reasons({ report }: { report: Pick<ComparisonReport, "flags"> }) {
   const flags = flagsOf(report);
   return (
     <div class={flags.length ? "verdict doubt" : "verdict"}>

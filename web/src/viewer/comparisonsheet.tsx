@@ -14,13 +14,14 @@ import {
   attenuationNotes,
   madeWith,
 } from "./comparedfacts";
-import { drawMap, endsOf, lutOf } from "./comparedmaps";
+import { drawMap } from "./comparedmaps";
 import type { ComparedScene } from "./comparedscene";
 import { shownAs } from "./comparedlook";
 import { drawSlices } from "./comparedslices";
 import { drawWall } from "./heartwall";
+import { Scale } from "./mapsrow";
 import { Drawn, Foot, Head, RATIO } from "./sheetparts";
-import { ColourBar, byMap, coloursOf } from "./wall";
+import { byMap, coloursOf } from "./wall";
 
 /** CSS pixels of the slices, of a map and of a wall on paper before they are brought to the width of their place. */
 const [WIDTH, HEIGHT, MAP, WALL] = [700, 500, 190, 160];
@@ -70,7 +71,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
       />
       <figcaption>
         <span>{named.short}</span>
-        <ColourBar lut={lutOf(named, lut)} low={endsOf(named)[0]} high={endsOf(named)[1]} />
+        <Scale named={named} lut={lut} />
       </figcaption>
     </figure>
   );

@@ -2,20 +2,9 @@
 // walls, and what they say in figures.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Parameters, type Result, type Volume, get, sentences, words } from "../api";
+import { type Job, type Parameters, type Result, type Volume, get, words } from "../api";
 import { Confirm } from "../confirm";
-import { JobLine, Trouble } from "../jobline";
-import {
-  comparisons,
-  eraseResult,
-  find,
-  isActive,
-  jobs,
-  loadResult,
-  loadResultsOf,
-  put,
-  watchActive,
-} from "../library";
+import { comparisons, eraseResult, find, loadResult, loadResultsOf } from "../library";
 import { PairForm } from "../pairform";
 import { type Draft, draftOf, parameterSpecs } from "../parameters";
 import { home } from "../route";
@@ -40,107 +29,52 @@ import {
   madeWith,
 } from "./comparedfacts";
 import { RowsOfSlices, WindowOfSlices } from "./comparedlook";
-import { ComparedMaps, lutOf } from "./comparedmaps";
+import { ComparedMaps } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
 import { ComparisonSheet } from "./comparisonsheet";
 import { Downloads, Takeaways } from "./figures";
 import { HeartWall } from "./heartwall";
+import { lutOf } from "./mapsrow";
 import { screenshot } from "./screenshot";
 import { printsAs } from "./sheetparts";
 import { ColourBar, byMap, coloursOf } from "./wall";
+import { NotShown, Working, isOfOtherPatient, problemIn } from "./working";
 
 export function ComparisonView({ id }: { id: string }) {
-  return id.startsWith("job_") ? <Working id={id} /> : <Shown id={id} />;
+  return id.startsWith("job_") ? (
+    <Working id={id} title="Rest and stress" view="comparison" again={job => <PairAgain job={job} />} />
+  ) : (
+    <Shown id={id} />
+  );
 }
 
-/** A comparison that is not there yet: how far it is, or why it failed and what can be changed. */
-function Working({ id }: { id: string }) {
-  const known = useWatched(jobs).find(job => job.id === id);
-  const [problem, setProblem] = useState("");
+/** What can be changed of a comparison that failed. */
+function PairAgain({ job }: { job: Job }) {
   const [again, setAgain] = useState<{
     pair: [Volume, Volume];
     draft: Draft;
     problem: { field: string | null; text: string } | null;
   } | null>(null);
   useEffect(() => {
-    if (known) return;
-    get<Job>(`/v1/jobs/${id}`).then(
-      job => {
-        put(job);
-        watchActive();
-      },
-      error => setProblem(words(error)),
-    );
-  }, [id]);
-  const made = known?.state === "succeeded" ? known.comparison : null;
-  useEffect(() => {
-    // The job's address is not one to come back to.
-    if (made) location.replace(`#/comparison/${made}`);
-  }, [made]);
-  const ended = known && !isActive(known) && known.state !== "succeeded" ? known : null;
-  useEffect(() => {
-    if (!ended) return;
-    const parameters = ended.parameters as unknown as Parameters;
-    const [stress, rest] = [ended.volume, parameters["rest"]];
+    const parameters = job.parameters as unknown as Parameters;
+    const [stress, rest] = [job.volume, parameters["rest"]];
     if (!stress || typeof rest !== "string") return;
     Promise.all([get<Volume>(`/v1/volumes/${stress}`), get<Volume>(`/v1/volumes/${rest}`), parameterSpecs()]).then(
-      ([atStress, atRest, specs]) => {
-        const text = ended.error ? sentences(ended.error).join(" ").trim() : "";
-        const field = ended.error?.field?.split(/[./]/).pop() ?? null;
-        // What no field of the form is wrong with is said once, above it.
-        const ofForm = specs.comparison.some(spec => spec.name === field);
-        setAgain({
-          pair: [atStress, atRest],
-          draft: draftOf(parameters, specs.comparison),
-          problem: text && ofForm ? { field, text } : null,
-        });
-      },
+      ([atStress, atRest, { comparison: specs }]) =>
+        setAgain({ pair: [atStress, atRest], draft: draftOf(parameters, specs), problem: problemIn(job, specs) }),
       () => undefined,
     );
-  }, [ended?.id]);
-  if (problem)
-    return (
-      <div class="pad">
-        <h1 class="hidden">Rest and stress</h1>
-        <p class="error" role="alert">
-          {problem}
-        </p>
-        <button type="button" onClick={home}>
-          Back to the list
-        </button>
-      </div>
-    );
-  if (!known) return <p class="quiet pad">Looking for the comparison …</p>;
-  const otherPatient = ended?.error?.type.endsWith("other-patient");
+  }, [job.id]);
+  if (!again) return null;
   return (
-    <div class="list working">
-      <h1>Rest and stress</h1>
-      {!ended && <JobLine job={known} />}
-      {ended && (
-        <section class="picked" aria-label="What can be changed">
-          {ended.state === "cancelled" ? (
-            <p>The comparison was cancelled.</p>
-          ) : (
-            <p role="alert">
-              <Trouble problem={otherPatient && ended.error ? { ...ended.error, fix: null } : ended.error} />
-            </p>
-          )}
-          {again && (
-            <PairForm
-              pair={again.pair}
-              stress={again.pair[0].id}
-              draft={again.draft}
-              problem={again.problem}
-              otherPatient={otherPatient ?? false}
-            />
-          )}
-        </section>
-      )}
-      <button type="button" onClick={home}>
-        Back to the list
-      </button>
-    </div>
+    <PairForm
+      pair={again.pair}
+      stress={again.pair[0].id}
+      draft={again.draft}
+      problem={again.problem}
+      otherPatient={isOfOtherPatient(job)}
+    />
   );
 }
 
@@ -169,18 +103,7 @@ function Shown({ id }: { id: string }) {
     read().catch(error => !gone && setProblem(words(error)));
     return () => void (gone = true);
   }, [id]);
-  if (problem)
-    return (
-      <div class="pad">
-        <h1 class="hidden">Rest and stress</h1>
-        <p class="error" role="alert">
-          {problem}
-        </p>
-        <button type="button" onClick={home}>
-          Back to the list
-        </button>
-      </div>
-    );
+  if (problem) return <NotShown title="Rest and stress" problem={problem} />;
   if (!result || !compared || !scans) return <p class="quiet pad">Opening the comparison …</p>;
   return <Comparison compared={compared} scans={scans} />;
 }
