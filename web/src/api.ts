@@ -13,6 +13,8 @@ import type {
   Problem,
   Segmentation,
   SegmentationSummary,
+  Serial,
+  SerialSummary,
 } from "./generated/openapi";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
@@ -20,17 +22,20 @@ import { Watched } from "./state";
 export type { JobState, Normals, Problem, Volume } from "./generated/openapi";
 export type FileOfResult = Download;
 /** Kinds of work on scans. */
-export type Kind = "model" | "segmentation" | "beat" | "comparison";
-export type Job = AnyJob & { kind: Kind | "serial" | "normals" };
+export type Kind = "model" | "segmentation" | "beat" | "comparison" | "serial";
+export type Job = AnyJob & { kind: Kind | "normals" };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;
 
-/** A model, a segmentation, a beat, a comparison or a template; which of them, its id says. */
-export type Result = Pick<Model | Segmentation | Beat | Comparison, "id" | "created_at" | "volume" | "files"> & {
+/** A model, a segmentation, a beat, a comparison, a serial comparison or a template; which of them, its id says. */
+export type Result = Pick<
+  Model | Segmentation | Beat | Comparison | Serial,
+  "id" | "created_at" | "volume" | "files"
+> & {
   parameters: Parameters;
-  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary & ComparisonSummary>;
-  links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"]>;
+  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary & ComparisonSummary & SerialSummary>;
+  links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"] & Serial["links"]>;
 };
 
 export class ProblemError extends Error {

@@ -1,9 +1,9 @@
 // Everything of a scan, or of one result, as one zip.
 
 import { ProblemError, type Result, type Volume, call } from "./api";
-import { comparisonsOf, loadScan, resultsOf } from "./library";
+import { comparisonsOf, loadScan, resultsOf, serialsOf } from "./library";
 import { saveBlob } from "./save";
-import { isBeat, isComparison, isFit, nameOf } from "./words";
+import { isBeat, isComparison, isFit, isSerial, nameOf } from "./words";
 import { zip } from "./zip";
 
 /** The name of a scan as files may have it, without the endings of its own files. */
@@ -76,13 +76,16 @@ export function saveResult(volume: Volume, result: Result, told: (text: string) 
 export async function saveScan(volume: Volume, told: (text: string) => void): Promise<void> {
   told("Reading what there is …");
   await loadScan(volume.id);
-  const results = [...resultsOf(volume.id), ...comparisonsOf(volume.id).filter(made => made.volume === volume.id)];
+  const results = [
+    ...resultsOf(volume.id),
+    ...[...comparisonsOf(volume.id), ...serialsOf(volume.id)].filter(made => made.volume === volume.id),
+  ];
   const scan = volume.originals.map(file => ({ name: `scan/${file.name}`, path: file.href }));
   const made = results.flatMap(result =>
     filesOf(
       volume,
       result,
-      `${isFit(result.id) ? "fit" : isBeat(result.id) ? "beat" : isComparison(result.id) ? "comparison" : "model"}_${result.id.slice(0, 12)}`,
+      `${isFit(result.id) ? "fit" : isBeat(result.id) ? "beat" : isComparison(result.id) ? "comparison" : isSerial(result.id) ? "serial" : "model"}_${result.id.slice(0, 12)}`,
     ),
   );
   await saved(fileNameOf(volume), [...scan, ...made], told);

@@ -68,10 +68,12 @@ interface PartProps<Part> {
   parts: Part[];
   nameOf: (part: Part) => string;
   rows: Figure[];
+  /** Further columns: the head of each, and what stands in it. */
+  more?: [string, (part: Part) => string][];
 }
 
 /** Parts of the wall with those of their figures that one of them has. */
-export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProps<Part>) {
+export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [] }: PartProps<Part>) {
   const columns = rows.filter(row => row.headline && parts.some(part => figureOf(row, part) !== undefined));
   return (
     <table class="segments">
@@ -84,6 +86,11 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProp
               {headOf(row)}
             </th>
           ))}
+          {more.map(([name]) => (
+            <th key={name} scope="col">
+              {name}
+            </th>
+          ))}
         </tr>
       </thead>
       <tbody>
@@ -92,6 +99,9 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProp
             <th scope="row">{nameOf(part)}</th>
             {columns.map(row => (
               <td key={row.place}>{written(row, figureOf(row, part), false)}</td>
+            ))}
+            {more.map(([name, of]) => (
+              <td key={name}>{of(part)}</td>
             ))}
           </tr>
         ))}

@@ -9,6 +9,7 @@ const PARTS: [string, Schema[]][] = [
   ["A fitted ventricle", ["SegmentationReport", "PolarSegment"]],
   ["The beat", ["BeatReport", "SegmentMotionReport"]],
   ["Rest and stress", ["ComparisonReport", "ComparedScan", "ComparedTerritory", "ComparedSegment"]],
+  ["Over the years", ["SerialScan", "SerialPair", "SerialSegment"]],
   ["Beside normal limits", ["Perfusion", "SegmentScore", "TerritoryScore"]],
   ["A surface model", ["ModelReport"]],
 ];

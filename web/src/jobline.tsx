@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { type Job, type Problem, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
-import { open, openComparison } from "./route";
+import { open, openComparison, openSerial } from "./route";
 import { ordinal, stage } from "./words";
 
 const KINDS: Record<Job["kind"], string> = {
@@ -32,6 +32,7 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
   const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
   const change = () => {
     if (job.kind === "comparison") openComparison(job.id);
+    else if (job.kind === "serial") openSerial(job.id);
     else if (onChange) onChange(job);
     else if (job.volume) open(job.volume, job.id);
   };

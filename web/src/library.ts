@@ -18,13 +18,14 @@ import {
 import { listed, readList, trouble, volumes } from "./scanlist";
 import { Watched } from "./state";
 import { tellTabs } from "./tabs";
-import { isBeat, isComparison, isFit, newest } from "./words";
+import { isBeat, isComparison, isFit, isSerial, newest } from "./words";
 
 export { trouble, volumes };
 export const models = new Watched<Result[]>([]);
 export const fits = new Watched<Result[]>([]);
 export const beats = new Watched<Result[]>([]);
 export const comparisons = new Watched<Result[]>([]);
+export const serials = new Watched<Result[]>([]);
 export const normals = new Watched<Normals[]>([]);
 export const templates = new Watched<Result[]>([]);
 export const jobs = new Watched<Job[]>([]);
@@ -40,16 +41,18 @@ export async function refresh(): Promise<void> {
     fits: fits.value,
     beats: beats.value,
     comparisons: comparisons.value,
+    serials: serials.value,
   };
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
-    const [, m, s, b, c, t, n] = await Promise.all([
+    const [, m, s, b, c, y, t, n] = await Promise.all([
       readList(),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
       page<Result>("beats", { limit: 100 }),
       page<Result>("comparisons", { limit: 100 }),
+      page<Result>("serials", { limit: 100 }),
       page<Result>("templates", { limit: 100 }),
       page<Normals>("normals", { limit: 100 }),
     ]);
@@ -58,9 +61,10 @@ export async function refresh(): Promise<void> {
     fits.value = renewed(known.fits, fits.value, s);
     beats.value = renewed(known.beats, beats.value, b);
     comparisons.value = renewed(known.comparisons, comparisons.value, c);
+    serials.value = renewed(known.serials, serials.value, y);
     templates.value = t.items;
     normals.value = n.items;
-    partial.value = Boolean(j.next || m.next || s.next || b.next || c.next);
+    partial.value = Boolean(j.next || m.next || s.next || b.next || c.next || y.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -118,15 +122,16 @@ const KINDS = [
   ["models", models],
   ["beats", beats],
   ["comparisons", comparisons],
+  ["serials", serials],
 ] as const;
 
 function kindOf(id: string): (typeof KINDS)[number] {
-  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : 1];
+  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : isSerial(id) ? 4 : 1];
 }
 
 /** What a job made, once it has succeeded. */
 export function madeBy(job: Job): string | null {
-  return job.segmentation ?? job.model ?? job.beat ?? job.comparison ?? null;
+  return job.segmentation ?? job.model ?? job.beat ?? job.comparison ?? job.serial ?? null;
 }
 
 export function find(id: string): Result | undefined {
@@ -184,6 +189,17 @@ export async function eraseNormals(id: string): Promise<void> {
 /** The comparisons in which a scan takes part, at stress or at rest. */
 export function comparisonsOf(volume: string): Result[] {
   return comparisons.value.filter(made => made.volume === volume || made.parameters["rest"] === volume).sort(newest);
+}
+
+/** The ids of the scans that a serial comparison, or its job, is of. */
+export function scansOf({ volume, parameters }: { volume?: string | null; parameters: object }): string[] {
+  const { others } = parameters as { others?: unknown };
+  return [volume ?? "", ...(typeof others === "string" ? others.split(",") : [])].filter(Boolean);
+}
+
+/** The serial comparisons in which one of these scans takes part. */
+export function serialsOf(...volumes: string[]): Result[] {
+  return serials.value.filter(made => scansOf(made).some(id => volumes.includes(id))).sort(newest);
 }
 
 // Browsers open at most six connections to a host, so few jobs are followed by events; the list tells of the others.

@@ -73,6 +73,8 @@ function Page() {
           <Chunk key={volume} load={viewer} name="viewer" volume={volume} />
         ) : view === "comparison" && result ? (
           <Chunk key="comparison" load={comparison} name="comparison" volume={result} />
+        ) : view === "serial" && result ? (
+          <Chunk key="serial" load={serial} name="serial comparison" volume={result} />
         ) : view === "limits" ? (
           <Chunk key="limits" load={limits} name="normal limits" />
         ) : view === "evaluation" ? (
@@ -124,6 +126,11 @@ const comparison = () =>
   import("./viewer/comparisonview").then(
     ({ ComparisonView }) =>
       (({ volume }) => <ComparisonView key={volume} id={volume ?? ""} />) as ComponentType<{ volume?: string }>,
+  );
+const serial = () =>
+  import("./viewer/serialview").then(
+    ({ SerialView }) =>
+      (({ volume }) => <SerialView key={volume} id={volume ?? ""} />) as ComponentType<{ volume?: string }>,
   );
 const limits = () => import("./limits").then(module => module.LimitsView as ComponentType<{ volume?: string }>);
 const evaluation = () =>

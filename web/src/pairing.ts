@@ -2,7 +2,7 @@
 // picked for a comparison.
 
 import type { Volume } from "./api";
-import { KINDS, kindOf } from "./scankind";
+import { KINDS, kindOf, mayAgree } from "./scankind";
 import { Watched } from "./state";
 import { isLabelMap, nameOf } from "./words";
 
@@ -110,15 +110,11 @@ export interface Pairing {
   unpaired: string[];
 }
 
-type Alike = (a: Volume, b: Volume) => boolean;
+export type Alike = (a: Volume, b: Volume) => boolean;
 
-const isSame: Alike = (a, b) => KINDS.every(kind => kind.of(a) === kind.of(b));
+export const isSame: Alike = (a, b) => KINDS.every(kind => kind.of(a) === kind.of(b));
 /** Whether no header contradicts that both are of one kind. */
-const mayBeSame: Alike = (a, b) =>
-  KINDS.every(kind => {
-    const [one, other] = [kind.of(a), kind.of(b)];
-    return one === null || other === null || one === other;
-  });
+export const mayBeSame: Alike = (a, b) => KINDS.every(kind => mayAgree(kind, a, b));
 
 /** The scans with the one scan that is alike, where each is the other's only one. */
 function matched(stress: Volume[], rest: Volume[], alike: Alike): [Volume, Volume][] {
@@ -132,11 +128,14 @@ function matched(stress: Volume[], rest: Volume[], alike: Alike): [Volume, Volum
 /** Modalities that show uptake. */
 const OF_UPTAKE = ["NM", "PT"];
 
+/** Whether a scan shows uptake. */
+export function isOfUptake(volume: Volume): boolean {
+  return !isLabelMap(volume) && OF_UPTAKE.includes(volume.dicom?.modality?.trim() || "NM");
+}
+
 /** Pairs the scans of one study by kind, the gated pair first, where headers tell stress and rest. */
 export function pairsOf(volumes: Volume[]): Pairing {
-  const images = volumes.filter(
-    volume => !isLabelMap(volume) && OF_UPTAKE.includes(volume.dicom?.modality?.trim() || "NM"),
-  );
+  const images = volumes.filter(isOfUptake);
   const of = (role: Role) => images.filter(volume => statedRole(volume) === role);
   let found: [Volume, Volume][] = [];
   let left = { stress: of("stress"), rest: of("rest") };

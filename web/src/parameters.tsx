@@ -44,10 +44,13 @@ interface Parameter {
 
 interface Document {
   paths: Record<string, { post?: { parameters: Parameter[] } }>;
-  components: { parameters: Record<string, Parameter> };
+  components: {
+    parameters: Record<string, Parameter>;
+    schemas: Record<string, { properties?: Record<string, Schema> }>;
+  };
 }
 
-/** Of requests, and of both scans of a comparison, which the page has chosen before. */
+/** Of requests, and of the scans of a comparison, which the page has chosen before. */
 const NOT_OF_THE_WORK = new Set([
   "external_id",
   "labels",
@@ -58,6 +61,7 @@ const NOT_OF_THE_WORK = new Set([
   "to",
   "stress",
   "rest",
+  "others",
 ]);
 
 let specs: Promise<Record<Kind, Spec[]>> | undefined;
@@ -70,6 +74,7 @@ export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
       segmentation: read(document, "/v1/segmentations"),
       beat: read(document, "/v1/beats"),
       comparison: read(document, "/v1/comparisons"),
+      serial: ofSchema(document, "SerialParameters"),
     }),
     error => {
       specs = undefined;
@@ -84,17 +89,26 @@ function read(document: Document, path: string): Spec[] {
     const parameter = document.components.parameters[given.$ref?.split("/").pop() ?? ""] ?? given;
     const { name, schema } = parameter;
     if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
-    return [
-      {
-        name,
-        schema,
-        help: parameter.description ?? schema.description ?? "",
-        title: schema["x-title"] ?? name,
-        group: schema["x-group"] ?? "",
-        unit: schema["x-unit"] ?? "",
-      },
-    ];
+    return [specOf(name, schema, parameter.description)];
   });
+}
+
+/** Of work that is asked for by bodies only. */
+function ofSchema(document: Document, name: string): Spec[] {
+  return Object.entries(document.components.schemas[name]?.properties ?? {})
+    .filter(([name]) => !NOT_OF_THE_WORK.has(name))
+    .map(([name, schema]) => specOf(name, schema));
+}
+
+function specOf(name: string, schema: Schema, help?: string): Spec {
+  return {
+    name,
+    schema,
+    help: help ?? schema.description ?? "",
+    title: schema["x-title"] ?? name,
+    group: schema["x-group"] ?? "",
+    unit: schema["x-unit"] ?? "",
+  };
 }
 
 /** What chooses the group of the normal limits, once limits are chosen. */

@@ -3,13 +3,21 @@
 import type { Result } from "./api";
 import { newerCorrections } from "./corrections";
 import { nameAmong, resultName } from "./resultnames";
-import { isBeat, isComparison, isFit, number } from "./words";
+import { isBeat, isComparison, isFit, isSerial, number } from "./words";
 
 export function ComparisonLink({ made }: { made: Result }) {
   return (
     <a class="result" href={`#/comparison/${made.id}`}>
       <b>{resultName(made)}</b> {figures(made)}
       {newerCorrections(made).length > 0 && <span class="quiet"> older than a correction</span>}
+    </a>
+  );
+}
+
+export function SerialLink({ made }: { made: Result }) {
+  return (
+    <a class="result" href={`#/serial/${made.id}`}>
+      <b>{resultName(made)}</b> {figures(made)}
     </a>
   );
 }
@@ -33,6 +41,22 @@ function figures(result: Result) {
           TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}
           {sss != null && `, SSS ${sss}, SDS ${sds}`}
           {change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}
+        </span>
+        <Doubts count={summary.flags?.length ?? 0} />
+      </>
+    );
+  }
+  if (isSerial(result.id)) {
+    const { worse_percent: worse, better_percent: better, ef_change_points: change } = summary;
+    const said = (verdict: string | null | undefined) => (verdict ? ` (${verdict.replaceAll("_", " ")})` : "");
+    return (
+      <>
+        <span>
+          worse {number(worse, 0, "%")}
+          {said(summary.worse_verdict)}, better {number(better, 0, "%")}
+          {said(summary.better_verdict)}
+          {change != null &&
+            `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}${said(summary.ef_change_verdict)}`}
         </span>
         <Doubts count={summary.flags?.length ?? 0} />
       </>

@@ -2,7 +2,7 @@
 
 import type { Result } from "./api";
 import { models, templates } from "./library";
-import { cut, exactMoment, isBeat, isComparison, isFit, moment } from "./words";
+import { cut, exactMoment, isBeat, isComparison, isFit, isSerial, moment } from "./words";
 
 /** What the model of a fit is called: a template by its name, where the page knows it. */
 function modelName(id: string): string {
@@ -25,6 +25,7 @@ export function resultName(result: Result): string {
     return `${changed.length ? "Corrected " : ""}${what}${by}`.replace(/^./, letter => letter.toUpperCase());
   }
   if (isComparison(result.id)) return "Rest and stress";
+  if (isSerial(result.id)) return `Over the years, ${String(result.summary.scans)} scans`;
   return `Model, ${String(result.summary["vertices"])} points`;
 }
 

@@ -51,23 +51,38 @@ function isPet({ dicom }: Volume): boolean | null {
   return modality ? modality === "PT" : null;
 }
 
+export const GATED: Kind = {
+  words: ["gated", "not gated"],
+  first: true,
+  inRow: () => false,
+  of: volume => volume.gates != null,
+};
+
 /** What is told of a scan, the most telling first. */
 export const KINDS: Kind[] = [
-  { words: ["gated", "not gated"], first: true, inRow: () => false, of: volume => volume.gates != null },
+  GATED,
   { words: ["attenuation corrected", "not corrected"], first: true, inRow: () => true, of: isCorrected },
   { words: ["prone", "supine"], first: false, inRow: is => is, of: isProne },
   { words: ["projections", "slices"], first: false, inRow: is => is, of: areProjections },
   { words: ["PET", "SPECT"], first: false, inRow: () => false, of: isPet },
 ];
 
+/** Whether no header contradicts that two scans agree in this. */
+export function mayAgree(kind: Kind, a: Volume, b: Volume): boolean {
+  const [one, other] = [kind.of(a), kind.of(b)];
+  return one === null || other === null || one === other;
+}
+
 const word = (kind: Kind, volume: Volume): string[] => {
   const is = kind.of(volume);
   return is === null ? [] : [kind.words[is ? 0 : 1]];
 };
 
-/** In words, what tells scans of one kind from the others of `all`; empty if nothing does. */
+/** In words, what tells scans of one kind from the others of `all`, where they agree in it; empty if nothing does. */
 export function kindOf(scans: Volume[], all: Volume[]): string {
-  const telling = KINDS.filter(kind => new Set(all.map(kind.of)).size > 1);
+  const telling = KINDS.filter(
+    kind => new Set(all.map(kind.of)).size > 1 && scans.every(a => scans.every(b => mayAgree(kind, a, b))),
+  );
   const words = telling.flatMap(kind => scans.flatMap(scan => word(kind, scan)).slice(0, 1));
   return words.join(", ");
 }

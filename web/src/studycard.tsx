@@ -1,4 +1,5 @@
-// One patient's study in the list of scans: its pairs of rest and stress, its scans, and earlier studies.
+// One patient's study in the list of scans: its pairs of rest and stress, its scans, earlier studies, and what is compared
+// over the years.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
@@ -9,6 +10,7 @@ import { ComparisonLink } from "./resultlink";
 import { loadCompany } from "./scanlist";
 import { useWatched } from "./state";
 import { cut, isoDay, study } from "./words";
+import { OverTheYears } from "./yearscard";
 
 interface Props {
   /** The key of the study. */
@@ -36,6 +38,7 @@ export function StudyCard({ name, scans, pairing: { pairs, unpaired }, compared,
   if (!first) return null;
   const isOf = ({ stress, rest }: StudyPair, made: Result) =>
     made.volume === stress.id && made.parameters["rest"] === rest.id;
+  const before = earlierStudies(first, known);
   const others = compared.filter(made => !pairs.some(pair => isOf(pair, made)));
   return (
     <li class="study" data-study={name}>
@@ -56,7 +59,8 @@ export function StudyCard({ name, scans, pairing: { pairs, unpaired }, compared,
         ))}
       </div>
       {isComplete && unpaired.length > 0 && <p class="quiet">{unpaired.join(" ")}</p>}
-      <Earlier studies={earlierStudies(first, known)} />
+      <Earlier studies={before} />
+      <OverTheYears scans={scans} before={before} isComplete={isComplete} />
       <ul class="scans">{children}</ul>
     </li>
   );

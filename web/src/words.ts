@@ -164,8 +164,13 @@ export function isComparison(id: string): boolean {
   return id.startsWith("cmp_");
 }
 
+export function isSerial(id: string): boolean {
+  return id.startsWith("ser_");
+}
+
 /** The kind of work that makes such a result. */
 export function kindOf(id: string): Kind {
+  if (isSerial(id)) return "serial";
   return isFit(id) ? "segmentation" : isBeat(id) ? "beat" : isComparison(id) ? "comparison" : "model";
 }
 

@@ -35,6 +35,20 @@ export async function fileComparison({ stress, rest, fits, normals, parameters }
   return follow(await post<Job>("/v1/comparisons", order));
 }
 
+/** What is compared over the years: scans in the order of their dates. */
+export interface Series {
+  scans: Volume[];
+  normals: string | null;
+  parameters: Record<string, ParameterValue>;
+}
+
+export async function fileSerial({ scans, normals, parameters }: Series): Promise<Job> {
+  const last = scans.at(-1);
+  const labels = last ? { name: storedNameOf(last).slice(0, 200) } : {};
+  const order = { scans: scans.map(scan => scan.id), parameters, labels, ...(normals ? { normals } : {}) };
+  return follow(await post<Job>("/v1/serials", order));
+}
+
 export async function file(
   kind: Kind,
   volume: Volume,

@@ -18,13 +18,15 @@ import {
   put,
   refresh,
   refreshMade,
+  scansOf,
+  serials,
   trouble,
   volumes,
 } from "./library";
 import { byStudy, offeredPair, pairsOf, pick, picked, statedRole, studyKey } from "./pairing";
 import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
-import { ComparisonLink, ResultLink } from "./resultlink";
+import { ComparisonLink, ResultLink, SerialLink } from "./resultlink";
 import { open, route } from "./route";
 import { toldOf } from "./scankind";
 import {
@@ -176,6 +178,8 @@ interface Row {
   open: Job[];
   /** The comparisons in which it takes part. */
   compared: Result[];
+  /** Those over the years. */
+  years: Result[];
 }
 
 function Scans() {
@@ -186,6 +190,7 @@ function Scans() {
   const allBeats = useWatched(beats);
   const allJobs = useWatched(jobs);
   const allComparisons = useWatched(comparisons);
+  const allSerials = useWatched(serials);
   const next = useWatched(more);
   const isLoaded = useWatched(loaded);
   const problem = useWatched(trouble);
@@ -203,8 +208,9 @@ function Scans() {
       compared: allComparisons
         .filter(made => made.volume === volume.id || made.parameters["rest"] === volume.id)
         .sort(newest),
+      years: allSerials.filter(made => scansOf(made).includes(volume.id)).sort(newest),
     }));
-  }, [all, known, of.search, allFits, allModels, allBeats, allJobs, allComparisons]);
+  }, [all, known, of.search, allFits, allModels, allBeats, allJobs, allComparisons, allSerials]);
   const cards = useMemo(() => [...byStudy(rows, row => row.volume)], [rows]);
   if (!isLoaded)
     return problem ? (
@@ -429,7 +435,11 @@ function Card({ rows }: { rows: Row[] }) {
       {rows
         .toSorted((a, b) => placeOf(a) - placeOf(b))
         .map(row => (
-          <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !isInside(made))} />
+          <ScanRow
+            key={row.volume.id}
+            row={{ ...row, open: row.open.filter(job => job.kind !== "serial"), years: [] }}
+            compared={row.compared.filter(made => !isInside(made))}
+          />
         ))}
     </StudyCard>
   );
@@ -437,7 +447,7 @@ function Card({ rows }: { rows: Row[] }) {
 
 /** `alone`: no other scan of its study is beside it, so that it says whose it is. */
 function ScanRow({
-  row: { volume, results, open: openJobs },
+  row: { volume, results, open: openJobs, years },
   compared,
   alone = false,
 }: {
@@ -494,6 +504,9 @@ function ScanRow({
         {compared.slice(0, 2).map(made => (
           <ComparisonLink key={made.id} made={made} />
         ))}
+        {years.slice(0, 2).map(made => (
+          <SerialLink key={made.id} made={made} />
+        ))}
         {results.slice(0, 4).map(result => (
           <ResultLink key={result.id} result={result} among={results} />
         ))}
@@ -502,7 +515,7 @@ function ScanRow({
             and {results.length - 4} more
           </a>
         )}
-        {results.length === 0 && compared.length === 0 && !openJobs.some(isActive) && (
+        {results.length + compared.length + years.length === 0 && !openJobs.some(isActive) && (
           <span class="quiet">no result yet</span>
         )}
         {problem && <span class="error">{problem}</span>}

@@ -20,6 +20,7 @@ function figuresOf(shown: Loaded): { rows: Figure[]; report: unknown } {
     case "model":
       return { rows: rowsOf("ModelReport").map(inSummary), report: shown.result.summary };
     case "comparison":
+    case "serial":
       return { rows: [], report: null };
   }
 }
@@ -190,7 +191,16 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
 }
 
 /** What is taken away most often, which stands first. */
-export function Takeaways({ result, volume }: { result: Result; volume: Volume }) {
+export function Takeaways({
+  result,
+  volume,
+  prints = true,
+}: {
+  result: Result;
+  volume: Volume;
+  /** Whether the view has a sheet of its own; what has none is printed from its report. */
+  prints?: boolean;
+}) {
   const [state, setState] = useState("");
   const failed = (error: unknown) => setState(words(error));
   const page = result.links.page;
@@ -207,9 +217,11 @@ export function Takeaways({ result, volume }: { result: Result; volume: Volume }
               Report
             </a>
           ))}
-        <button type="button" onClick={() => print()}>
-          Print
-        </button>
+        {prints && (
+          <button type="button" onClick={() => print()}>
+            Print
+          </button>
+        )}
         <button type="button" onClick={() => void saveResult(volume, result, setState).catch(failed)}>
           Everything as zip
         </button>

@@ -18,11 +18,13 @@ import {
   madeBy,
   models,
   resultsOf,
+  serials,
+  serialsOf,
 } from "../library";
 import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { nameAmong, resultName, timeOf } from "../resultnames";
-import { home, isAt, open, openComparison, route } from "../route";
+import { home, isAt, open, openComparison, openSerial, route } from "../route";
 import { useWatched } from "../state";
 import { file, isFiledHere } from "../work";
 import { isBeat, isFit, isGated, kindOf, moment, nameOf, shape, study, titleOf } from "../words";
@@ -103,6 +105,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       const made = madeBy(job);
       if (!made || !isAt(volume.id) || (scene?.edit.value && !isFiledHere(job))) continue;
       if (job.kind === "comparison") openComparison(made);
+      else if (job.kind === "serial") openSerial(made);
       else open(volume.id, made, job.labels["parent"] ?? null);
     }
   }, [own]);
@@ -424,14 +427,20 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   );
 }
 
-/** The comparisons of rest and stress in which a scan takes part. */
+/** The comparisons, of rest and stress and over the years, in which a scan takes part. */
 function Comparisons({ volume }: { volume: string }) {
   useWatched(comparisons);
+  useWatched(serials);
   return (
     <>
       {comparisonsOf(volume).map(made => (
         <a key={made.id} class="result" href={`#/comparison/${made.id}`}>
           <b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span>
+        </a>
+      ))}
+      {serialsOf(volume).map(made => (
+        <a key={made.id} class="result" href={`#/serial/${made.id}`}>
+          <b>{resultName(made)}</b> <span class="quiet">{moment(made.created_at)}</span>
         </a>
       ))}
       <button
