@@ -16,6 +16,7 @@ import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
 import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
+import { serials } from "./serial.mjs";
 import { start } from "./service.mjs";
 import { studies } from "./study.mjs";
 
@@ -628,6 +629,7 @@ async function main() {
   const tools = { PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose };
   await comparisons(tools);
   await studies(tools);
+  await serials(tools);
 
   await check("the documentation of the API", async () => {
     for (const [width, dark] of [
