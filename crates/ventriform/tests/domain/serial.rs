@@ -65,6 +65,28 @@ fn verdict(report: &SerialReport, figure: &str, later: usize) -> Verdict {
     report.change(figure, 1, later).unwrap().verdict
 }
 
+/// The images of a round heart agree whichever way it is turned about its axis; its nodes do not.
+#[test]
+fn a_heart_that_looks_alike_from_all_sides_is_not_turned() {
+    let scans = [7, 8].map(|seed| {
+        let parameters = PhantomParameters {
+            shape: [40; 3],
+            spacing_mm: [6.0; 3],
+            pose_spread_deg: 0.0,
+            pose_spread_mm: 0.0,
+            seed,
+            ..PhantomParameters::default()
+        };
+        phantom(&parameters, &Monitor::silent()).unwrap().volume
+    });
+    let made = compared(&scans).unwrap();
+    let turned = made.scans[1].registration.motion.degrees();
+    assert!(turned < 25.0, "{turned}");
+    let report = made.report();
+    let volumes: Vec<f64> = report.scans.iter().filter_map(|scan| scan.cavity_ml).collect();
+    assert!((volumes[0] / volumes[1] - 1.0).abs() < 0.1, "{volumes:?}");
+}
+
 /// The heart lies elsewhere in the second scan; the third has a defect.
 #[test]
 fn what_changed_is_told_and_what_moved_is_not() {

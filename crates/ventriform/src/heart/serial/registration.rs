@@ -5,7 +5,7 @@
 //!
 //! 1. The rigid motion that maps the nodes of one wall to those of the other best, in the sense of least squares.
 //! 2. From there, the motion at which both images, blurred alike, correlate best over the places about the first wall: steps
-//!    along and about three axes, tried in turn and halved where none helps.
+//!    along and about three axes, tried in turn and halved where none helps, up to 20 mm and 20 degrees.
 //!
 //! Guaranteed: the correlation is never less than that of step 1.
 //!
@@ -28,6 +28,10 @@ const BESIDE_MM: f64 = 9.0;
 const APART_MM: f64 = 3.0;
 /// Every so manieth ray of a row is taken.
 const COLUMN_STEP: usize = 3;
+/// How far the images may turn and shift the heart from where the nodes put it. A heart that looks alike from all sides would
+/// turn about its axis for nothing, and the mean of the walls' nodes would collapse.
+const FARTHEST_TURN_DEGREES: f64 = 20.0;
+const FARTHEST_SHIFT_MM: f64 = 20.0;
 /// The first and the last step, mm and degrees.
 const FIRST_STEP: f64 = 4.0;
 const LAST_STEP: f64 = 0.1;
@@ -153,6 +157,12 @@ pub fn registered(
     let mut motion = RigidMotion::between(&first.mesh.vertices, &later.mesh.vertices);
     let middle = first.mesh.vertices.iter().sum::<Vec3>() / first.mesh.vertices.len() as f64;
     let centre = motion.point(&middle);
+    let start = motion;
+    let is_near = |motion: &RigidMotion| {
+        let turned = (motion.turn * start.turn.inverse()).angle().to_degrees();
+        let shifted = (motion.point(&middle) - centre).norm();
+        turned <= FARTHEST_TURN_DEGREES && shifted <= FARTHEST_SHIFT_MM
+    };
     let (mut best, mut step) = (likeness(&motion), FIRST_STEP);
     while step > LAST_STEP {
         monitor.check()?;
@@ -162,6 +172,9 @@ pub fn registered(
                 let mut by = [0.0; 6];
                 by[axis] = side;
                 let tried = motion.nudged(&centre, &by);
+                if !is_near(&tried) {
+                    continue;
+                }
                 let found = likeness(&tried);
                 if found > best {
                     (best, motion, better) = (found, tried, true);

@@ -492,7 +492,7 @@ mod tests {
         let said = of_comparison(&report);
         assert_eq!(
             said[0],
-            "Medium severe reversible defect in the anterior wall: 13 % (9 to 17 %) of the wall."
+            "Medium severe reversible defect in the anterior wall: 12 % (9 to 16 %) of the wall."
         );
         assert_eq!(said[1], "No fixed defect.");
         // Whether the cavity is larger is open: nothing is said.
