@@ -12,7 +12,7 @@
 The examples are recorded in the walk: one of every document, by its schema. A committed example stays if it still has
 all fields that the recorded one has: it would only have other values.
 
-Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
+Needs openapi-spec-validator, jsonschema, fhir.resources and pydicom, and `ventriform phantom` for a scan.
 """
 
 import copy
@@ -31,6 +31,7 @@ import urllib.parse
 import urllib.request
 
 import pydicom
+from fhir.resources.R4B.bundle import Bundle
 from jsonschema import Draft202012Validator
 from openapi_spec_validator import validate
 from pydicom.uid import ExplicitVRLittleEndian, NuclearMedicineImageStorage, generate_uid
@@ -355,6 +356,9 @@ def serials(walk, folder, first):
     octets = {"content-type": "application/octet-stream"}
     request = urllib.request.Request(f"{URL}/v1/volumes", data=scan, headers=octets, method="POST")
     stored = json.load(urllib.request.urlopen(request))
+    # The structured report belongs to a patient and a study.
+    identity = {"patient_id": "4711", "study_uid": "1.2.840.99999.2"}
+    call("put", "/v1/volumes/{id}/identity", expect=200, id=stored["id"], body=identity)
     order = {"scans": [first, stored["id"]], "parameters": {"same_patient": True}}
     _, job = call("post", "/v1/serials", expect=202, body=order)
     serial = wait(walk, job)["serial"]
@@ -362,6 +366,49 @@ def serials(walk, folder, first):
     call("post", "/v1/serials", expect=200, body=order, headers=waiting)
     call("get", "/v1/serials", expect=200)
     return serial
+
+
+def readings(walk, results):
+    """A reading of each kind of result that is read, and the reading of the comparison amended; by kind of result."""
+    call = walk.call
+    scores = [0] * 16 + [2]
+    stated = {"reader": "Doe^Jane^^Dr.", "quality": "fair", "limits": "Simulated.", "impression": "No doubt.\nNormal."}
+    read = {}
+    for kind, own in {
+        "comparisons": {"stress_scores": scores, "rest_scores": [0] * 17},
+        "segmentations": {"scores": scores},
+        "beats": {},
+    }.items():
+        order = {**stated, **own, "result": results[kind]}
+        _, job = call("post", "/v1/readings", expect=202, body=order)
+        read[kind] = wait(walk, job)["reading"]
+    call("post", "/v1/readings", expect=409, body={**stated, "result": results["beats"]})
+    again = {**stated, "result": results["beats"], "amends": read["beats"]}
+    waiting = {"prefer": UNTIL_DONE, "accept": "application/json"}
+    call("post", "/v1/readings", expect=200, body=again, headers=waiting)
+    _, listed = call("get", "/v1/readings", expect=200)
+    statuses = {}
+    for reading in listed["readings"]:
+        bundle = json.load(urllib.request.urlopen(f"{URL}{reading['links']['fhir']}"))
+        assert Bundle.model_validate(bundle).entry[0].resource.conclusion == stated["impression"]
+        statuses[reading["id"]] = bundle["entry"][0]["resource"]["status"]
+    amended = listed["readings"][0]["id"]
+    assert statuses == {amended: "amended", **{own: "final" for own in read.values()}}, statuses
+    return read
+
+
+# The files that a reading has only of one kind of result.
+READ_OF = {
+    "report.json": "segmentations",
+    "mask.nii.gz": "segmentations",
+    "mesh.json": "segmentations",
+    "polar.svg": "segmentations",
+    "beat.json": "beats",
+    "curve.svg": "beats",
+    "polar_motion.svg": "beats",
+    "polar_thickening.svg": "beats",
+    "polar_phase.svg": "beats",
+}
 
 
 def workitems(walk):
@@ -514,6 +561,7 @@ def everything(walk, folder):
     call("get", "/v1/beats", expect=200)
     comparison = rest_and_stress(walk, folder, volume["id"], normals)
     serial = serials(walk, folder, volume["id"])
+    read = readings(walk, {"segmentations": segmentation, "beats": beat, "comparisons": comparison})
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
@@ -530,6 +578,7 @@ def everything(walk, folder):
         "beats": beat,
         "comparisons": comparison,
         "serials": serial,
+        "readings": read["comparisons"],
         "normals": normals,
         "templates": added["id"],
         "readers": reader["id"],
@@ -537,7 +586,7 @@ def everything(walk, folder):
     }
     for template, item in walk.contract.document["paths"].items():
         found = re.match(
-            r"/v1/(models|segmentations|beats|comparisons|serials|normals|templates|readers|volumes)/\{id\}(/.*)?$",
+            r"/v1/(models|segmentations|beats|comparisons|serials|readings|normals|templates|readers|volumes)/\{id\}(/.*)?$",
             template,
         )
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
@@ -551,6 +600,8 @@ def everything(walk, folder):
                     own = anatomical
                 elif name == "projections.png":
                     own = from_views
+                elif found[1] == "readings":
+                    own = read[READ_OF.get(name, "comparisons")]
                 else:
                     own = made
                 call("get", template, expect=200, id=own, file=name.replace("NN_NN", "01_02").replace("NN", "01"))

@@ -14,6 +14,7 @@ after PS3.3 C.8.4.15, and the objects are compared with mask.nii.gz and mesh.jso
   and anatomical ones in a group whose site and method say which it is;
 - of a beat of 16 gates: mask_ed.dcm and mask_es.dcm, as mask.dcm, whose frames refer to the frames of their own gate;
   measurements.dcm, read by highdicom and by dcmqi: the figures of beat.json;
+- fhir.json of a beat and of a comparison, read by the models of fhir.resources: patient, study, the same figures;
 - of a comparison of two studies: measurements.dcm, read likewise: the figures of comparison.json, the images of both
   studies; pictures, which belong to the study of the scan at stress;
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
@@ -32,6 +33,7 @@ import highdicom
 import nibabel
 import numpy as np
 import pydicom
+from fhir.resources.R4B.bundle import Bundle
 from highdicom import _standard_utils as standard
 from pydicom.sr._concepts_dict import concepts
 
@@ -281,6 +283,7 @@ def check_beat(program, folder):
         "PHASE-SD": report["phase"]["sd_degrees"],
         "PHASE-BANDWIDTH": report["phase"]["bandwidth_degrees"],
     }
+    check_fhir(out, wanted)
     sr = highdicom.sr.srread(out / "measurements.dcm")
     groups = sr.content.get_image_measurement_groups()
     ends = {
@@ -342,6 +345,7 @@ def check_comparison(program, folder):
     subprocess.run([program, "compare", *scans, "-o", out, "--dicom"], check=True, capture_output=True)
     report = json.loads((out / "comparison.json").read_text())
     stress, rest = (pydicom.dcmread(here / f"{name}.dcm") for name in ("stress", "rest"))
+    check_fhir(out, {"428832008": report["tid"], "REVERSIBLE": report["reversible_percent"]})
     for name in "measurements", "page", "polar_stress", "polar_rest", "polar_difference":
         data = pydicom.dcmread(out / f"{name}.dcm")
         check_object(data)
@@ -404,6 +408,25 @@ def check_comparison(program, folder):
             assert np.isclose(of("rest")["251053005"], segment["rest_percent"]), segment
             assert np.isclose(of("change")["DIFFERENCE"], segment["difference_points"]), segment
     print(f"comparison: {report['reversible_percent']} % reversible, 5 objects as they must be")
+
+
+def check_fhir(out, report):
+    """The structured report as FHIR resources, by the models of R4."""
+    bundle = Bundle.model_validate(json.loads((out / "fhir.json").read_text()))
+    resources = [entry.resource for entry in bundle.entry]
+    diagnostic = resources[0]
+    assert (diagnostic.get_resource_type(), diagnostic.status) == ("DiagnosticReport", "preliminary")
+    data = pydicom.dcmread(out / "measurements.dcm")
+    patient = next(own for own in resources if own.get_resource_type() == "Patient")
+    assert patient.identifier[0].value == data.PatientID
+    studies = {own.identifier[0].value for own in resources if own.get_resource_type() == "ImagingStudy"}
+    assert f"urn:oid:{data.StudyInstanceUID}" in studies
+    found = {}
+    for own in resources:
+        if own.get_resource_type() == "Observation" and own.valueQuantity:
+            found.setdefault(own.code.coding[0].code, []).append(float(own.valueQuantity.value))
+    for code, value in report.items():
+        assert any(abs(one - value) < 1e-3 for one in found[code]), (code, value, found.get(code))
 
 
 def check_object(data):

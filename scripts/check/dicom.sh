@@ -21,7 +21,7 @@ trap 'rm -rf "$out"' EXIT
 if ! command -v dciodvfy >/dev/null || ! command -v dcmdump >/dev/null; then
   debian dicom3tools dcmtk
 fi
-python_with "nibabel, highdicom"
+python_with "nibabel, highdicom, fhir.resources"
 [ -x target/debug/ventriform ] || cargo build --quiet --bins --test layering
 
 target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed 2 2>/dev/null

@@ -24,7 +24,7 @@ if ! command -v Orthanc >/dev/null || [ ! -e $plugin ] || ! command -v storescu 
   # The package starts one of its own.
   as_root service orthanc stop >/dev/null 2>&1 || true
 fi
-python_with "nibabel, highdicom"
+python_with "nibabel, highdicom, fhir.resources"
 program=${VENTRIFORM:-target/debug/ventriform}
 [ -x "$program" ] || cargo build --quiet --bins --test layering
 
