@@ -6,7 +6,7 @@ import type { Role } from "./pairing";
 import { isBeat, isFit } from "./words";
 
 /** The parameters of a fit that a comparison keeps of a corrected one, under the name of the scan's role. */
-const CORRECTIONS = ["center", "axis", "base", "segments_from"];
+export const CORRECTIONS = ["center", "axis", "base", "segments_from"];
 
 export const correctionName = (role: Role, name: string): string => `${role}_${name}`;
 

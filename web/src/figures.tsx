@@ -70,10 +70,12 @@ interface PartProps<Part> {
   rows: Figure[];
   /** Further columns: the head of each, and what stands in it. */
   more?: [string, (part: Part) => string][];
+  /** The part that views mark, and what is done when the mouse points to one, or presses on it. */
+  marks?: { isMarked: (part: Part) => boolean; onPoint: (part: Part | null) => void; onPress: (part: Part) => void };
 }
 
 /** Parts of the wall with those of their figures that one of them has. */
-export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [] }: PartProps<Part>) {
+export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [], marks }: PartProps<Part>) {
   const columns = rows.filter(row => row.headline && parts.some(part => figureOf(row, part) !== undefined));
   return (
     <table class="segments">
@@ -95,7 +97,12 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [] 
       </thead>
       <tbody>
         {parts.map(part => (
-          <tr key={nameOf(part)}>
+          <tr
+            key={nameOf(part)}
+            class={marks?.isMarked(part) ? "marked" : undefined}
+            onMouseEnter={() => marks?.onPoint(part)}
+            onMouseLeave={() => marks?.onPoint(null)}
+            onClick={() => marks?.onPress(part)}>
             <th scope="row">{nameOf(part)}</th>
             {columns.map(row => (
               <td key={row.place}>{written(row, figureOf(row, part), false)}</td>

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { gated, nm } from "./nm.mjs";
+import { gated, gatedNm, nm } from "./nm.mjs";
 
 /** Mid and apical segments of the LAD, which lack uptake at stress. */
 const LAD = [7, 8, 13, 14];
@@ -13,6 +13,12 @@ const FIGURES = [
   ["1440-dark", 1440, true],
   ["400-light", 400, false],
   ["400-dark", 400, true],
+];
+
+const BEATING = [
+  ["1280-light", 1280, 800, false],
+  ["1920-dark", 1920, 1080, true],
+  ["400-light", 400, 850, false],
 ];
 
 /** Simulated scans of one patient, as NIfTI and as NM files of one study, and normal limits of simulated people. */
@@ -71,6 +77,23 @@ const isDrawn = canvas =>
     return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
   });
 
+/** What a canvas shows, as a number that other pictures hardly have, and how many pixels have the last colour. */
+const looked = canvas =>
+  canvas.evaluate(element => {
+    // A copy: canvases of the page are not made to be read often.
+    const copy = Object.assign(document.createElement("canvas"), { width: element.width, height: element.height });
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(element, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    let [sum, last] = [0, 0];
+    for (let at = 0; at < data.length; at += 4) {
+      const [red, green, blue] = data.subarray(at, at + 3);
+      sum = (Math.imul(sum, 31) + 65536 * red + 256 * green + blue) | 0;
+      if (red > 248 && green > 250 && blue > 150 && blue < 175) last++;
+    }
+    return { sum, last };
+  });
+
 /**
  * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the
  * uptake in the colours of both.
@@ -80,7 +103,7 @@ const likeness = (page, path) =>
     const picture = await createImageBitmap(await (await fetch(path)).blob());
     const shown = document.querySelector(".compared-slices");
     // As `comparedslices.tsx` and `runs/rest_stress/slices.rs` lay their cells.
-    const [aside, above, ratio] = [46, 19, shown.width / shown.clientWidth];
+    const [aside, above, ratio] = [52, 19, shown.width / shown.clientWidth];
     const cell = Math.min((shown.clientWidth - aside) / 8, (shown.clientHeight - 3 * above) / 6);
     const left = aside + (shown.clientWidth - aside - 8 * cell) / 2;
     const cut = (source, x, y, size) => {
@@ -347,6 +370,140 @@ export async function comparisons(tools) {
     assert.equal(await cutOff(page), 0, "nothing is cut off");
     assert.deepEqual(faults, []);
     await close();
+    await own.stop();
+  });
+
+  await check("rest and stress of gated scans: one player, one cursor, curves and maps of both beats", async () => {
+    data();
+    const own = await service();
+    const order = new FormData();
+    for (const [number, [role, gates]] of [
+      ["stress", 16],
+      ["rest", 8],
+    ].entries()) {
+      const at = (...parts) => readFileSync(join(tools.SCREENSHOTS, ...parts));
+      const series = { number, description: `Gated ${role}`, tracer: "Tetrofosmin Tc-99m" };
+      const scan = gatedNm(at(role, "spect.nii.gz"), at("rest", "lv_truth.nii.gz"), gates, "Compared^Clara", {
+        id: "PH9",
+        series,
+      });
+      order.append(role, new Blob([scan]), `${role}.dcm`);
+    }
+    const made = await fetch(`${own.address}/v1/comparisons`, {
+      method: "POST",
+      body: order,
+      headers: { prefer: "wait=300" },
+    });
+    assert.equal(made.status, 200, await made.clone().text());
+    const [{ id }] = (await read(own.address, "/v1/comparisons")).comparisons;
+    const { beat } = await reportOf(own.address, id);
+    const gateText = page => page.textContent(".player .gate");
+    for (const [name, width, height, dark] of BEATING) {
+      const { page, faults, close } = await tab(browser, `${own.address}/#/comparison/${id}`, { width, height, dark });
+      await displayed(page);
+      const slices = page.locator(".compared-slices");
+      assert.match(await gateText(page), /sum of all gates/);
+      await page.getByLabel("contours").check();
+      await page.evaluate(() => document.activeElement.blur());
+      const still = await looked(slices);
+      // The space bar plays all rows; it stops them, too.
+      await page.keyboard.press("Space");
+      await page.waitForFunction(() => /gate \d+ of 16/.test(document.querySelector(".player .gate").textContent));
+      await page.waitForFunction(() => !document.querySelector(".player [role=status]"));
+      if (name === BEATING[0][0]) {
+        // No beat is stored yet: the contours are those of the sum, and the view says so.
+        assert.match(await page.textContent(".compared-stage"), /Contours at stress and at rest: the wall in the sum/);
+        await look(page, "comparison-cine-no-beats");
+        await page.getByRole("button", { name: "Fit the beats" }).click();
+      }
+      await page.waitForSelector(".compared-beat .beat-chart");
+      await page.waitForFunction(
+        () => !/the wall in the sum/.test(document.querySelector(".compared-stage").textContent),
+      );
+      const moving = await gateText(page);
+      await page.waitForFunction(text => document.querySelector(".player .gate").textContent !== text, moving);
+      await page.evaluate(() => document.activeElement.blur());
+      await page.keyboard.press("Space");
+      const held = await gateText(page);
+      await page.waitForTimeout(400);
+      assert.equal(await gateText(page), held);
+      // Arrows go gate by gate; the scan with fewer gates is at the same moment of its cycle.
+      const pictures = new Set();
+      for (let step = 0; step < 16; step++) {
+        await page.keyboard.press("ArrowRight");
+        await page.waitForTimeout(120);
+        const [, stress, rest] = /gate (\d+) of 16 .*rest (\d+) of 8/.exec(await gateText(page));
+        assert.equal(Number(rest), Math.ceil(Number(stress) / 2));
+        const { sum, last } = await looked(slices);
+        pictures.add(sum);
+        // The thick, bright wall of end systole has the last colour in few places; in the sum, a quarter of it has.
+        assert.ok(last < 0.2 * still.last, `${last} pixels of the last colour in a gate, ${still.last} in the sum`);
+      }
+      assert.ok(pictures.size === 16, `${pictures.size} pictures of 16 gates`);
+      await page.getByRole("button", { name: "Sum of gates" }).click();
+      await page.waitForTimeout(200);
+      assert.deepEqual(await looked(slices), still, "the sum is as it was");
+
+      assert.equal(await page.locator(".compared-beat polyline").count(), 2, "curves");
+      const figures = await page.textContent(".compared-beat table");
+      for (const text of [
+        `End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}90 %:`,
+        `${beat.ef_change_points > 0 ? "+" : ""}${number(beat.ef_change_points, 0, "points")}`,
+      ])
+        assert.ok(figures.includes(text), `${text} in ${figures}`);
+      assert.equal(await page.locator(".compared-beat .phases svg").count(), 2, "histograms");
+      assert.deepEqual(
+        await page
+          .locator(".map-row")
+          .evaluateAll(rows => rows.map(row => row.querySelectorAll("canvas[role=img]").length)),
+        [3, 3, 3, 3],
+      );
+
+      // Pointing to a place marks it in maps, slices and tables; the cursor of a press comes back afterwards.
+      const unmarked = await looked(slices);
+      const map = page.locator(".map-row", { hasText: "Thickening" }).locator(".polar canvas").nth(2);
+      await map.scrollIntoViewIfNeeded();
+      const box = await map.boundingBox();
+      const place = { x: box.width * 0.5, y: box.height * 0.2 };
+      await map.click({ position: place });
+      await page.waitForFunction(() => /7 mid anterior/.test(document.querySelector(".readout").textContent));
+      await page.waitForTimeout(200);
+      assert.notDeepEqual(await looked(slices), unmarked, "the place is marked on the slices");
+      assert.match(
+        (await page.locator(".readout tbody tr").allTextContents()).join(" "),
+        /Uptake.*%.*Motion inward.*mm.*Thickening.*%.*Phase.*°/,
+      );
+      const segments = page.locator(".compared-beat summary", { hasText: "Segments" });
+      // By the keyboard: the mouse would point to what opens under it.
+      await page.mouse.move(5, 5);
+      await segments.press("Enter");
+      await page.waitForSelector(".compared-beat tr.marked");
+      assert.match(await page.textContent(".compared-beat tr.marked"), /^7 mid anterior/);
+      await page.locator(".compared-beat tbody tr", { hasText: "10 mid inferior" }).hover();
+      await page.waitForFunction(() => /10 mid inferior/.test(document.querySelector(".readout").textContent));
+      await page.locator(".compared-beat h2").first().hover();
+      await page.waitForFunction(() => /7 mid anterior/.test(document.querySelector(".readout").textContent));
+      await page.mouse.move(5, 5);
+      await segments.press("Enter");
+      // By keys.
+      await map.focus();
+      for (let step = 0; step < 20; step++) await page.keyboard.press("ArrowDown");
+      assert.match(await page.textContent(".readout"), /mid inferior|basal inferior/);
+
+      if (width >= 1920) {
+        const used = await slices.evaluate(element => {
+          const cell = Math.min((element.clientWidth - 52) / 8, (element.clientHeight - 3 * 19) / 6);
+          return (8 * cell + 52) / element.clientWidth;
+        });
+        assert.ok(used > 0.95, `${used} of the width`);
+        assert.equal(await page.locator(".maps-side .heart-wall").count(), 2, "walls stand beside the slices");
+      }
+      await page.keyboard.press("Escape");
+      await look(page, `comparison-beat-${name}`);
+      if (width === 1280) assert.equal(await printed(page, `comparison-beat-${name}`), 1, "one page on paper");
+      assert.deepEqual(faults, []);
+      await close();
+    }
     await own.stop();
   });
 

@@ -1,10 +1,10 @@
-// The volume curve of a beat and the histogram of its phases.
+// The volume curve of a beat, or of two on one chart, and the histogram of its phases.
 
 import type { ComponentChildren } from "preact";
 import type { BeatReport } from "../generated/openapi";
 import { useWatched } from "../state";
 import { number } from "../words";
-import type { Scene } from "./scene";
+import type { Beating } from "./beating";
 
 const [WIDTH, HEIGHT] = [320, 190];
 const AREA = { left: 32, right: 308, top: 20, bottom: 158 };
@@ -73,7 +73,7 @@ function volumeAt({ curve }: BeatReport, turns: number): number {
 }
 
 /** The curve with the gates, the marks of end diastole and end systole, and where `scene` is in the beat. */
-export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Scene | null }) {
+export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Beating | null }) {
   const { curve, gates } = report;
   const width = 360 / gates.length;
   const marks = [
@@ -132,7 +132,7 @@ export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Scen
 }
 
 /** The moving mark. */
-function Now({ scene, report, up }: { scene: Scene; report: BeatReport; up: (value: number) => number }) {
+function Now({ scene, report, up }: { scene: Beating; report: BeatReport; up: (value: number) => number }) {
   const turns = useWatched(scene.moment);
   if (turns === null) return null;
   const x = across(360 * turns);
@@ -144,12 +144,74 @@ function Now({ scene, report, up }: { scene: Scene; report: BeatReport; up: (val
   );
 }
 
-export function PhaseHistogram({ report: { phase } }: { report: BeatReport }) {
+interface CurvesProps {
+  /** Whose curves, each with the name by which its colour is known. */
+  of: [string, BeatReport][];
+  scene: Beating;
+  /** Gates of one cycle of what beats. */
+  gates: number;
+}
+
+/** The curves of several beats at the same moments of their cycles. */
+export function VolumeCurves({ of, scene, gates }: CurvesProps) {
+  return (
+    <Frame
+      name={`Volumes of the cavity over the cycle: ${of.map(([name, { edv_ml, esv_ml }]) => `at ${name} largest ${number(edv_ml, 0, "ml")}, smallest ${number(esv_ml, 0, "ml")}`).join("; ")}`}
+      highest={Math.max(...of.flatMap(([, { curve }]) => curve.map(point => point.cavity_ml)))}
+      unit="ml"
+      below="per cent of the cycle"
+      onPick={degrees => scene.hold(degrees / 360, gates)}>
+      {up => (
+        <>
+          {[0, 25, 50, 75, 100].map(share => (
+            <text key={share} x={across(3.6 * share)} y={AREA.bottom + 14} text-anchor="middle">
+              {share}
+            </text>
+          ))}
+          {of.map(([name, report]) => (
+            <g key={name} class={name}>
+              <polyline
+                points={[...report.curve, { degrees: 360, cavity_ml: report.curve[0]?.cavity_ml ?? 0 }]
+                  .map(point => `${across(point.degrees).toFixed(1)},${up(point.cavity_ml).toFixed(1)}`)
+                  .join(" ")}
+              />
+              {(
+                [
+                  [report.end_diastole_degrees, report.edv_ml],
+                  [report.end_systole_degrees, report.esv_ml],
+                ] as const
+              ).map(([degrees, ml]) => (
+                <circle key={degrees} cx={across(degrees)} cy={up(ml)} r={3.5} />
+              ))}
+              <Now scene={scene} report={report} up={up} />
+            </g>
+          ))}
+        </>
+      )}
+    </Frame>
+  );
+}
+
+interface HistogramProps {
+  report: BeatReport;
+  /** What stands before its name, where there are several. */
+  of?: string;
+  /** The share of the wall at which the axis ends, where several have the same. */
+  highest?: number;
+}
+
+/** The greatest share of the wall in one bin. */
+export function highestOf({ phase }: BeatReport): number {
+  return Math.max(0.01, ...phase.histogram);
+}
+
+export function PhaseHistogram({ report, of = "", highest = highestOf(report) }: HistogramProps) {
+  const { phase } = report;
   const width = across(phase.bin_degrees) - across(0);
   return (
     <Frame
-      name={`Phases of the wall: mean ${number(phase.mean_degrees, 0, "°")}, standard deviation ${number(phase.sd_degrees, 0, "°")}, bandwidth ${number(phase.bandwidth_degrees, 0, "°")}${phase.reliable ? "" : "; not reliable"}`}
-      highest={100 * Math.max(0.01, ...phase.histogram)}
+      name={`${of && `${of}: `}Phases of the wall: mean ${number(phase.mean_degrees, 0, "°")}, standard deviation ${number(phase.sd_degrees, 0, "°")}, bandwidth ${number(phase.bandwidth_degrees, 0, "°")}${phase.reliable ? "" : "; not reliable"}`}
+      highest={100 * highest}
       unit="% of the wall"
       below="degrees of the cycle">
       {up => (

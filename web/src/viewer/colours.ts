@@ -98,6 +98,11 @@ export const CYCLE = ramp(
 /** More uptake at stress than at rest, as much, less. */
 export const DIFFERENCE = ramp(figures.difference.map((rgb, n): [number, string] => [n / 2, hex(rgb)]));
 
+/** The same colours for what stress has more than rest: those of less at stress come first. */
+export const STRESS_LESS_REST = ramp(
+  [...figures.difference].reverse().map((rgb, n): [number, string] => [n / 2, hex(rgb)]),
+);
+
 /** A wall that moves outward, or gets thinner. */
 export const OUTWARD = figures.outward as [number, number, number];
 

@@ -3,9 +3,11 @@
 
 import { type FileOfResult, type Result, call, get } from "../api";
 import type { ComparedScan, ComparisonReport, PolarFigure, PolarMap } from "../generated/openapi";
+import { DIVERGING, type Lut, STRESS_LESS_REST } from "./colours";
+import type { Loaded } from "./loaded";
 import type { Mesh } from "./mesh";
 import { type Axis, type Plane, frameOf, heartPlanes } from "./plane";
-import { type DrawnMap, WallFrame, figureMap, uptakeMap } from "./polar";
+import { type DrawnMap, FIGURES, WallFrame, differenceMap, figureMap, turnedMap, uptakeMap } from "./polar";
 import type { Triple } from "./shown";
 import { type Vec, add, mix, scale, sub, turned, unit } from "./vector";
 import { type Voxels, unpackNifti } from "./volume";
@@ -157,17 +159,50 @@ export interface NamedMap {
   scan: WhichScan | null;
   /** The figure; uptake is shown in colours that a person chooses. */
   figure: PolarFigure["figure"] | "uptake";
+  /** Its colours, where they are not those of the figure. */
+  lut?: Lut;
+}
+
+/** Half of the range of differences of a figure of the beat. */
+const BEAT_DIFFERENCE = { motion: 6, thickening: 40, phase: 90 } as const;
+
+/** Motion, thickening and phase of two beats: at stress, at rest, and what stress has more. */
+export function beatRowsOf({ report }: Compared, stress: Loaded, rest: Loaded): NamedMap[][] {
+  return (["motion", "thickening", "phase"] as const).flatMap(figure => {
+    const [atStress, atRest] = [stress, rest].map(({ figures }) => figures.find(map => map.figure === figure));
+    if (!atStress || !atRest) return [];
+    const { name } = FIGURES[figure];
+    const [one, other] = [turnedMap(figureMap(atStress), report.turn_degrees), figureMap(atRest)];
+    const less = differenceMap(one, other, BEAT_DIFFERENCE[figure]);
+    return [
+      [
+        { name: `${name}, stress`, short: "Stress", map: one, scan: "stress", figure },
+        { name: `${name}, rest`, short: "Rest", map: other, scan: "rest", figure },
+        {
+          name: `${name}, stress less rest`,
+          short: "Stress less rest",
+          map: less,
+          scan: null,
+          figure,
+          lut: figure === "phase" ? DIVERGING : STRESS_LESS_REST,
+        },
+      ] satisfies NamedMap[],
+    ];
+  });
 }
 
 /** The map of every figure, in the order in which they are shown. */
-export function mapsOf({ stress, rest, difference }: Compared): NamedMap[] {
+export function mapsOf({ report, stress, rest, difference }: Compared): NamedMap[] {
+  // That of stress as the heart at stress is turned, so that one place is the same on all maps and slices.
+  const asTurned = (one: ComparedHeart, map: DrawnMap) =>
+    one.scan === "stress" ? turnedMap(map, report.turn_degrees) : map;
   const maps: NamedMap[] = [];
   for (const one of [stress, rest])
     if (one.polar)
       maps.push({
         name: `Uptake, ${one.scan}`,
         short: one.scan === "stress" ? "Stress" : "Rest",
-        map: uptakeMap(one.polar),
+        map: asTurned(one, uptakeMap(one.polar)),
         scan: one.scan,
         figure: "uptake",
       });
@@ -184,7 +219,7 @@ export function mapsOf({ stress, rest, difference }: Compared): NamedMap[] {
       maps.push({
         name: `z, ${one.scan}`,
         short: `z, ${one.scan}`,
-        map: figureMap(one.z),
+        map: asTurned(one, figureMap(one.z)),
         scan: one.scan,
         figure: "z",
       });
@@ -193,7 +228,7 @@ export function mapsOf({ stress, rest, difference }: Compared): NamedMap[] {
       maps.push({
         name: `Score, ${one.scan}`,
         short: `Score, ${one.scan}`,
-        map: figureMap(one.score),
+        map: asTurned(one, figureMap(one.score)),
         scan: one.scan,
         figure: "score",
       });

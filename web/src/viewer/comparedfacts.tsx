@@ -3,13 +3,25 @@
 import type { ComponentChildren } from "preact";
 import type { Result } from "../api";
 import { newerCorrections } from "../corrections";
-import { BesideTable, PartTable, figureOf, flatName, intervalOf, rowsOf, verdictOf, written } from "../figures";
-import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
+import {
+  BesideTable,
+  type Figure,
+  PartTable,
+  figureOf,
+  flatName,
+  intervalOf,
+  rowsOf,
+  verdictOf,
+  written,
+} from "../figures";
+import type { BeatReport, ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
 import { beats, fits } from "../library";
 import { Simulated } from "../limits";
 import { useWatched } from "../state";
 import { moment, number } from "../words";
-import { flagsOf, isSimulated } from "./compared";
+import { type Compared, flagsOf, isSimulated } from "./compared";
+import { useSegmentMarks } from "./comparedmaps";
+import type { ComparedScene } from "./comparedscene";
 
 /** The figures that are read first: name, figure, what stands smaller beside it, and what it is. */
 export function headlinesOf(report: ComparisonReport): [string, string, string, string][] {
@@ -224,10 +236,12 @@ export function TerritoryTable({ report }: { report: ComparisonReport }) {
   );
 }
 
-export function SegmentChanges({ report }: { report: ComparisonReport }) {
+export function SegmentChanges({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
+  const { report } = compared;
   return (
     <PartTable
       caption="Segments at stress and at rest"
+      marks={useSegmentMarks(compared, scene)}
       head="Segment"
       parts={report.segments}
       nameOf={one => `${one.segment} ${one.name}`}
@@ -251,6 +265,59 @@ export function BeatTable({ report: { beat } }: { report: ComparisonReport }) {
       ]}
       rows={rows}
     />
+  );
+}
+
+/** The same with what stress has more, and the intervals of both beats. */
+export function BeatChangeTable({
+  report: { beat },
+  reports,
+}: {
+  report: ComparisonReport;
+  reports: { stress: BeatReport; rest: BeatReport } | null;
+}) {
+  if (!beat) return null;
+  const figures = beat as Record<string, unknown>;
+  const of = (scan: string, row: Figure): number | undefined => {
+    const value = figures[`${scan}_${row.place}`];
+    return typeof value === "number" ? value : undefined;
+  };
+  const change = (row: Figure) => {
+    const [stress, rest] = [of("stress", row), of("rest", row)];
+    if (stress === undefined || rest === undefined) return "–";
+    return written({ ...row, signed: true, unit: row.unit === "%" ? "points" : row.unit }, stress - rest);
+  };
+  const rows = rowsOf("BeatReport").filter(row => of("stress", row) !== undefined || of("rest", row) !== undefined);
+  return (
+    <table>
+      <caption class="hidden">The beat at stress and at rest, and its change</caption>
+      <thead>
+        <tr>
+          <td />
+          <th scope="col">stress</th>
+          <th scope="col">rest</th>
+          <th scope="col">change</th>
+        </tr>
+      </thead>
+      <tbody>
+        {rows.map(row => (
+          <tr key={row.place}>
+            <th scope="row" title={row.about}>
+              {row.label}
+            </th>
+            {(["stress", "rest"] as const).map(scan => (
+              <td key={scan}>
+                {written(row, of(scan, row))}
+                {reports && intervalOf(row, reports[scan]) && (
+                  <span class="interval">90 %: {intervalOf(row, reports[scan])}</span>
+                )}
+              </td>
+            ))}
+            <td>{change(row)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
   );
 }
 

@@ -78,7 +78,7 @@ export function WindowOfSlices({ scene }: { scene: ComparedScene }) {
           }}
         />
       </label>
-      <label class="inline" title={means}>
+      <label class="inline" title={`${means}; of single gates: of the brightest such place in any gate`}>
         of
         <select
           aria-label="What counts as 100 per cent in the slices"

@@ -1,9 +1,12 @@
-// What the views of a comparison share: colours, window, rows of slices, the chosen slice, the cursor on both walls, from
-// where the walls are seen.
+// What the views of a comparison share: colours, window, rows of slices, the chosen slice, the cursor on both walls, the
+// moment of the beat, from where the walls are seen.
 
-import { Watched } from "../state";
+import { Watched, useWatched } from "../state";
+import { Beating } from "./beating";
 import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";
 import { type Row, SLICE_MM, STANDARD_ROWS } from "./compared";
+import type { Gates, OfBoth } from "./comparedgates";
+import type { Loaded } from "./loaded";
 import type { PolarLabels } from "./polar";
 import { type Vec, unit } from "./vector";
 
@@ -13,7 +16,7 @@ export type Written = PolarLabels | "scores";
 /** What counts as 100 per cent in the slices. */
 export type Normalisation = "wall" | "image" | "slice";
 
-export class ComparedScene {
+export class ComparedScene extends Beating {
   /** Colours of the uptake in slices, polar maps and walls. */
   readonly lut = new Watched<Lut>(kept(WALL_LUT, UPTAKE) ?? LUTS[UPTAKE]!);
   readonly normalisation = new Watched<Normalisation>("wall");
@@ -29,25 +32,47 @@ export class ComparedScene {
   readonly chosen = new Watched<{ kind: number; number: number }>({ kind: 0, number: 3 });
   /** The place on both walls: shares of width and height of a drawn polar map. */
   readonly cursor = new Watched<[number, number] | null>(null);
+  /** The place under the mouse, which goes before the cursor as long as it is there. */
+  readonly pointed = new Watched<[number, number] | null>(null);
+  /** The gates of both scans, once all of them were read. */
+  readonly gates = new Watched<OfBoth<Gates | null>>({ stress: null, rest: null });
+  /** The stored beats of both scans that belong to the comparison. */
+  readonly beats = new Watched<OfBoth<Loaded | null>>({ stress: null, rest: null });
   readonly written = new Watched<Written>("means");
   /** From where both walls are seen, in directions of the heart: lateral, anterior, apex. */
   readonly seen = new Watched<{ toward: Vec; up: Vec }>(FROM_FRONT);
 
-  /** Everything that changes a slice. */
+  /** Everything that changes the picture of a slice. */
+  watchPictures(act: () => void): () => void {
+    return watchAll(
+      [
+        this.lut,
+        this.normalisation,
+        this.window,
+        this.rows,
+        this.across,
+        this.smooth,
+        this.contours,
+        this.gate,
+        this.gates,
+      ],
+      act,
+    );
+  }
+
+  /** Everything that is marked on slices. */
+  watchMarks(act: () => void): () => void {
+    return watchAll([this.chosen, this.cursor, this.pointed], act);
+  }
+
   watch(act: () => void): () => void {
-    const all: { watch(act: () => void): () => void }[] = [
-      this.lut,
-      this.normalisation,
-      this.window,
-      this.rows,
-      this.across,
-      this.smooth,
-      this.contours,
-      this.chosen,
-      this.cursor,
-    ];
-    const ends = all.map(watched => watched.watch(act));
+    const ends = [this.watchPictures(act), this.watchMarks(act)];
     return () => ends.forEach(end => end());
+  }
+
+  /** The place that all views mark. */
+  get place(): [number, number] | null {
+    return this.pointed.value ?? this.cursor.value;
   }
 
   /** Changes the row of the marked slice, which stays within it. */
@@ -71,6 +96,18 @@ export class ComparedScene {
     const last = rows[kind]!.count - 1;
     if (number > last) this.chosen.value = { kind, number: last };
   }
+}
+
+function watchAll(all: { watch(act: () => void): () => void }[], act: () => void): () => void {
+  const ends = all.map(watched => watched.watch(act));
+  return () => ends.forEach(end => end());
+}
+
+/** The place that all views mark; the component is drawn again when it changes. */
+export function usePlace(scene: ComparedScene): [number, number] | null {
+  useWatched(scene.pointed);
+  useWatched(scene.cursor);
+  return scene.place;
 }
 
 /** Anterior and lateral wall, apex down. */

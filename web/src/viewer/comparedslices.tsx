@@ -1,16 +1,19 @@
 // Slices of stress above those of rest, at the same levels, in the same colours; one of them, chosen, is shown large.
 
+import { useRef } from "preact/hooks";
 import { useWatched } from "../state";
 import { useCanvas } from "./canvas";
 import { type Compared, type ComparedHeart, KINDS, type Row, sliceAt, spacingOf, wallFrameOf } from "./compared";
+import { type ShownHeart, heartAt } from "./comparedgates";
 import type { ComparedScene } from "./comparedscene";
-import { type Look, brightestOf, contours, label, paintVoxels } from "./drawing";
+import { type Look, label, outlineOf, paintVoxels, strokeOutline } from "./drawing";
+import type { Mesh } from "./mesh";
 import { type Plane, point } from "./plane";
 import { placeOnMap, onMap } from "./polar";
-import { type Vec, dot, sub } from "./vector";
+import { type Vec, dot, norm, sub } from "./vector";
 
 /** CSS pixels left of the slices for the name of the scan, and above each kind for its own. */
-const [ASIDE, ABOVE] = [46, 19];
+const [ASIDE, ABOVE] = [52, 19];
 const GROUND = "#0a0e11";
 const MARK = "#4de3ff";
 
@@ -39,30 +42,44 @@ function cursorPlace(one: ComparedHeart, cursor: [number, number] | null): Vec |
 }
 
 /** How a slice of a scan is painted: `window` in per cent of its wall, its whole image, or the slice itself. */
-function lookAt(one: ComparedHeart, scene: ComparedScene, plane: Plane, origin: Vec): Look {
-  const voxels = one.region!;
-  const full = {
-    wall: () => one.polar?.reference ?? one.report.polar?.reference ?? voxels.highest,
-    image: () => voxels.highest,
-    slice: () => brightestOf(voxels, plane, origin, scene.across.value),
-  }[scene.normalisation.value]();
-  const [low, high] = scene.window.value.map(percent => (full * percent) / 100) as [number, number];
+function lookAt({ voxels, full }: ShownHeart, scene: ComparedScene, plane: Plane, origin: Vec): Look {
+  const hundred = full[scene.normalisation.value](plane, origin, scene.across.value);
+  const [low, high] = scene.window.value.map(percent => (hundred * percent) / 100) as [number, number];
   return { voxels, lut: scene.lut.value, low, high, smooth: scene.smooth.value };
 }
+
+const cut = new WeakMap<Mesh, Map<string, Float32Array>>();
+/** Slices of one wall whose contours are kept: those of all rows, as they are and as they were. */
+const MOST_CUT = 100;
+
+/** The contour of a wall in a slice; a beat shows each many times. */
+function contourOf(mesh: Mesh, plane: Plane, origin: Vec): Float32Array {
+  const key = [...plane.normal, ...plane.right, ...origin].join();
+  const known = cut.get(mesh) ?? new Map<string, Float32Array>();
+  const found = known.get(key);
+  if (found) return found;
+  const made = outlineOf(mesh, plane, origin);
+  if (known.size >= MOST_CUT) known.clear();
+  cut.set(mesh, known.set(key, made));
+  return made;
+}
+
+/** The colour of the wall's contour. */
+const WALL = { colour: "#3dffa8" };
 
 export interface SlicesStyle {
   width: number;
   height: number;
   ratio: number;
-  /** Whether cursor and chosen slice are marked. */
-  marks: boolean;
+  /** The moment of the beat, in turns of its cycle; null: the sum of all gates. */
+  moment: number | null;
 }
 
 export function drawSlices(
   element: HTMLCanvasElement,
   compared: Compared,
   scene: ComparedScene,
-  { width, height, ratio, marks }: SlicesStyle,
+  { width, height, ratio, moment }: SlicesStyle,
 ): void {
   const context = element.getContext("2d");
   if (!context) return;
@@ -74,6 +91,7 @@ export function drawSlices(
   const { cell, left, top } = laid(width, height, rows);
   const factor = cell / across;
   const small = width < 500;
+  const gates = scene.gates.value;
   for (const [kind, { name, short, way }] of KINDS.entries()) {
     label(
       context,
@@ -84,11 +102,11 @@ export function drawSlices(
       small ? 10 : 12,
     );
     for (const [row, one] of [compared.stress, compared.rest].entries()) {
-      const { heart, region } = one;
+      const { heart } = one;
+      const shown = heartAt(one, gates[one.scan], moment);
       const y = top(kind, row);
       label(context, row === 0 ? "Stress" : "Rest", left - 5, y + cell / 2, "right", small ? 9 : 12);
-      if (!heart || !region) continue;
-      const place = marks ? cursorPlace(one, scene.cursor.value) : null;
+      if (!heart || !shown) continue;
       for (let n = 0; n < rows[kind]!.count; n++) {
         const { plane, origin } = sliceAt({ heart, scan: one.scan }, kind, n, rows);
         const box = { x: left + n * cell + 0.5, y: y + 0.5, width: cell - 1, height: cell - 1 };
@@ -96,27 +114,42 @@ export function drawSlices(
         context.beginPath();
         context.rect(box.x, box.y, box.width, box.height);
         context.clip();
-        paintVoxels(context, lookAt(one, scene, plane, origin), plane, origin, box, factor);
+        paintVoxels(context, lookAt(shown, scene, plane, origin), plane, origin, box, factor);
         context.translate(box.x + box.width / 2, box.y + box.height / 2);
-        if (scene.contours.value)
-          contours(
-            context,
-            [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }],
-            plane,
-            origin,
-            factor,
-            across / 2,
-          );
-        if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(heart, kind, rows) / 2) {
-          const from = sub(place, origin);
-          ring(context, dot(from, plane.right) * factor, dot(from, plane.down) * factor, Math.max(3, cell / 22));
-        }
+        if (scene.contours.value) strokeOutline(context, contourOf(shown.mesh, plane, origin), factor, WALL);
         context.restore();
       }
     }
   }
+}
+
+/** Marks the place of the cursor and the chosen slice on drawn slices. */
+function markSlices(
+  context: CanvasRenderingContext2D,
+  compared: Compared,
+  scene: ComparedScene,
+  width: number,
+  height: number,
+): void {
+  const rows = scene.rows.value;
+  const { cell, left, top } = laid(width, height, rows);
+  const factor = cell / scene.across.value;
+  for (const [row, one] of [compared.stress, compared.rest].entries()) {
+    const { heart } = one;
+    const place = cursorPlace(one, scene.place);
+    if (!heart || !place) continue;
+    for (const kind of KINDS.keys()) {
+      for (let n = 0; n < rows[kind]!.count; n++) {
+        const { plane, origin } = sliceAt({ heart, scan: one.scan }, kind, n, rows);
+        const from = sub(place, origin);
+        if (Math.abs(dot(from, plane.normal)) > spacingOf(heart, kind, rows) / 2) continue;
+        const [x, y] = [dot(from, plane.right) * factor, dot(from, plane.down) * factor];
+        if (Math.max(Math.abs(x), Math.abs(y)) > cell / 2) continue;
+        ring(context, left + (n + 0.5) * cell + x, top(kind, row) + cell / 2 + y, Math.max(3, cell / 22));
+      }
+    }
+  }
   const { kind, number } = scene.chosen.value;
-  if (!marks) return;
   context.strokeStyle = MARK;
   context.lineWidth = 1.5;
   context.strokeRect(left + number * cell + 1, top(kind, 0) + 1, cell - 2, 2 * cell - 2);
@@ -135,47 +168,101 @@ function ring(context: CanvasRenderingContext2D, x: number, y: number, radius: n
   }
 }
 
-/** Takes the cursor to the wall of a heart nearest to a place in one of its slices. */
-function goTo(
+/** Millimetres from the middle of the wall within which the mouse points to it. */
+const NEAR_WALL = 18;
+
+/** The place of the wall of a heart nearest to one in a slice, on its polar map; null where it is farther than `reach`. */
+function onWall(
   scene: ComparedScene,
   one: ComparedHeart,
-  kind: number,
-  number: number,
+  { kind, number }: { kind: number; number: number },
   right: number,
   down: number,
-): void {
+  reach = Infinity,
+): [number, number] | null {
   const frame = wallFrameOf(one);
-  if (!one.heart || !one.polar || !frame) return;
+  if (!one.heart || !one.polar || !frame) return null;
   const { plane, origin } = sliceAt({ heart: one.heart, scan: one.scan }, kind, number, scene.rows.value);
-  scene.cursor.value = onMap(one.polar, ...frame.place(point(plane, origin, right, down)));
+  const place = point(plane, origin, right, down);
+  const [rows, columns] = frame.place(place);
+  if (norm(sub(place, frame.at(rows, columns))) > reach) return null;
+  return onMap(one.polar, rows, columns);
+}
+
+/** The slice under the pointer, and the place in it, mm from its middle. */
+interface Hit {
+  one: ComparedHeart;
+  kind: number;
+  number: number;
+  right: number;
+  down: number;
+}
+
+function hitOf(
+  { offsetX, offsetY, currentTarget }: PointerEvent & { currentTarget: HTMLCanvasElement },
+  compared: Compared,
+  scene: ComparedScene,
+): Hit | null {
+  const rows = scene.rows.value;
+  const { cell, left, top } = laid(currentTarget.clientWidth, currentTarget.clientHeight, rows);
+  const number = Math.floor((offsetX - left) / cell);
+  const mm = scene.across.value / cell;
+  for (const kind of KINDS.keys()) {
+    if (number < 0 || number >= rows[kind]!.count) continue;
+    for (const [row, one] of [compared.stress, compared.rest].entries()) {
+      const [x, y] = [offsetX - left - (number + 0.5) * cell, offsetY - top(kind, row) - cell / 2];
+      if (Math.abs(y) <= cell / 2) return { one, kind, number, right: x * mm, down: y * mm };
+    }
+  }
+  return null;
 }
 
 export function ComparedSlices({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
   const { kind, number } = useWatched(scene.chosen);
   const rows = useWatched(scene.rows);
-  const draw = (element: HTMLCanvasElement) =>
-    drawSlices(element, compared, scene, {
-      width: element.clientWidth,
-      height: element.clientHeight,
-      ratio: element.width / element.clientWidth,
-      marks: true,
-    });
-  const { canvas } = useCanvas(draw, act => scene.watch(act), compared);
-  const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
-    const { clientWidth: width, clientHeight: height } = event.currentTarget;
-    const { cell, left, top } = laid(width, height, rows);
-    const n = Math.floor((event.offsetX - left) / cell);
-    for (const at of KINDS.keys()) {
-      if (n < 0 || n >= rows[at]!.count) continue;
-      for (const [row, one] of [compared.stress, compared.rest].entries()) {
-        const [x, y] = [event.offsetX - left - (n + 0.5) * cell, event.offsetY - top(at, row) - cell / 2];
-        if (Math.abs(y) > cell / 2) continue;
-        scene.chosen.value = { kind: at, number: n };
-        const mm = scene.across.value / cell;
-        goTo(scene, one, at, n, x * mm, y * mm);
-        return;
-      }
+  // The slices without marks: these follow the mouse, and slices are slow to paint.
+  const painted = useRef<{ canvas: HTMLCanvasElement; fresh: boolean } | null>(null);
+  const draw = (element: HTMLCanvasElement) => {
+    const context = element.getContext("2d");
+    if (!context) return;
+    const { clientWidth: width, clientHeight: height } = element;
+    const ratio = element.width / width;
+    painted.current ??= { canvas: document.createElement("canvas"), fresh: false };
+    const { canvas } = painted.current;
+    const same = canvas.width === element.width && canvas.height === element.height;
+    if (!painted.current.fresh || !same) {
+      if (!same) Object.assign(canvas, { width: element.width, height: element.height });
+      drawSlices(canvas, compared, scene, { width, height, ratio, moment: scene.gate.value });
+      painted.current.fresh = true;
     }
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(canvas, 0, 0);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    markSlices(context, compared, scene, width, height);
+  };
+  const { canvas } = useCanvas(
+    draw,
+    act => {
+      const again = () => {
+        if (painted.current) painted.current.fresh = false;
+        act();
+      };
+      again();
+      const ends = [scene.watchPictures(again), scene.watchMarks(act)];
+      return () => ends.forEach(end => end());
+    },
+    compared,
+  );
+  const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
+    const hit = hitOf(event, compared, scene);
+    if (!hit) return;
+    scene.chosen.value = { kind: hit.kind, number: hit.number };
+    scene.cursor.value = onWall(scene, hit.one, hit, hit.right, hit.down) ?? scene.cursor.value;
+  };
+  const pointTo = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
+    if (event.pointerType === "touch") return;
+    const hit = hitOf(event, compared, scene);
+    scene.pointed.value = hit && onWall(scene, hit.one, hit, hit.right, hit.down, NEAR_WALL);
   };
   const move = (along: number, over: number) => {
     const next = Math.max(0, Math.min(KINDS.length - 1, kind + over));
@@ -194,6 +281,8 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
       aria-valuenow={rows.slice(0, kind).reduce((sum, row) => sum + row.count, 0) + number + 1}
       aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
       onPointerDown={press}
+      onPointerMove={pointTo}
+      onPointerLeave={() => (scene.pointed.value = null)}
       onKeyDown={event => {
         const by: Record<string, [number, number]> = {
           ArrowLeft: [-1, 0],
@@ -245,22 +334,15 @@ function Large({
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = GROUND;
     context.fillRect(0, 0, width, height);
-    if (!one.heart || !one.region) return;
+    const shown = heartAt(one, scene.gates.value[one.scan], scene.gate.value);
+    if (!one.heart || !shown) return;
     const { plane, origin } = sliceAt({ heart: one.heart, scan: one.scan }, kind, number, rows);
     const factor = Math.min(width, height) / scene.across.value;
-    paintVoxels(context, lookAt(one, scene, plane, origin), plane, origin, { x: 0, y: 0, width, height }, factor);
+    paintVoxels(context, lookAt(shown, scene, plane, origin), plane, origin, { x: 0, y: 0, width, height }, factor);
     context.save();
     context.translate(width / 2, height / 2);
-    if (scene.contours.value)
-      contours(
-        context,
-        [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }],
-        plane,
-        origin,
-        factor,
-        scene.across.value,
-      );
-    const place = cursorPlace(one, scene.cursor.value);
+    if (scene.contours.value) strokeOutline(context, contourOf(shown.mesh, plane, origin), factor, WALL);
+    const place = cursorPlace(one, scene.place);
     if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(one.heart, kind, rows) / 2) {
       const from = sub(place, origin);
       ring(context, dot(from, plane.right) * factor, dot(from, plane.down) * factor, 6);
@@ -275,17 +357,21 @@ function Large({
     label(context, south, width / 2, height - 11, "center", 11);
   };
   const { canvas } = useCanvas(draw, act => scene.watch(act), one);
+  const placeOf = (event: PointerEvent & { currentTarget: HTMLCanvasElement }, reach?: number) => {
+    const { clientWidth: width, clientHeight: height } = event.currentTarget;
+    const factor = Math.min(width, height) / scene.across.value;
+    const [x, y] = [(event.offsetX - width / 2) / factor, (event.offsetY - height / 2) / factor];
+    return onWall(scene, one, { kind, number }, x, y, reach);
+  };
   return (
     <figure class="slice">
       <canvas
         ref={canvas}
         role="img"
         aria-label={`${title}: ${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
-        onPointerDown={event => {
-          const { clientWidth: width, clientHeight: height } = event.currentTarget;
-          const factor = Math.min(width, height) / scene.across.value;
-          goTo(scene, one, kind, number, (event.offsetX - width / 2) / factor, (event.offsetY - height / 2) / factor);
-        }}
+        onPointerDown={event => (scene.cursor.value = placeOf(event) ?? scene.cursor.value)}
+        onPointerMove={event => event.pointerType !== "touch" && (scene.pointed.value = placeOf(event, NEAR_WALL))}
+        onPointerLeave={() => (scene.pointed.value = null)}
       />
     </figure>
   );

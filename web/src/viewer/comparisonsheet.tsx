@@ -96,7 +96,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
         height={HEIGHT}
         name="Slices of stress above those of rest"
         draw={element =>
-          drawSlices(element, compared, scene, { width: WIDTH, height: HEIGHT, ratio: RATIO, marks: false })
+          drawSlices(element, compared, scene, { width: WIDTH, height: HEIGHT, ratio: RATIO, moment: null })
         }
       />
       <div class={beside.length > 0 ? "sheet-lower" : ""}>

@@ -29,12 +29,14 @@ import {
   madeWith,
 } from "./comparedfacts";
 import { RowsOfSlices, WindowOfSlices } from "./comparedlook";
+import { ComparedBeats, ComparedPlayer } from "./comparedbeat";
 import { ComparedMaps } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
 import { ComparisonSheet } from "./comparisonsheet";
 import { Downloads, Takeaways } from "./figures";
 import { HeartWall } from "./heartwall";
+import { useMedia } from "./media";
 import { lutOf } from "./mapsrow";
 import { screenshot } from "./screenshot";
 import { printsAs } from "./sheetparts";
@@ -113,7 +115,11 @@ interface ComparisonProps {
   scans: { stress: Volume; rest: Volume };
 }
 
+/** Where the rows of slices have the height of the window, and the walls stand beside them. */
+const WIDE = "(min-width: 1700px)";
+
 function Comparison({ compared, scans }: ComparisonProps) {
+  const wide = useMedia(WIDE);
   const scene = useMemo(() => new ComparedScene(), [compared]);
   useEffect(
     () => printsAs(() => <ComparisonSheet compared={compared} scene={scene} scans={scans} />),
@@ -130,14 +136,20 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <BothMeasures report={compared.report} />
         <SimulatedNote report={compared.report} />
         {!areNotComparable(compared.report) && <Reasons report={compared.report} />}
-        <Particulars compared={compared} />
+        <Particulars compared={compared} scene={scene} />
         <Downloads result={compared.result} volume={scans.stress} />
         <Others compared={compared} />
         <p class="research foot">Research software, not a medical device. Measurements are not a diagnosis.</p>
       </aside>
-      <Stage compared={compared} scene={scene} name={nameOf(scans.stress)} />
+      <Stage compared={compared} scene={scene} scans={scans} wide={wide} />
       <div class="pictures maps-side">
         <ComparedMaps compared={compared} scene={scene} />
+        <ComparedBeats compared={compared} scene={scene} scans={scans} />
+        {wide && (
+          <div class="side-walls">
+            <Walls compared={compared} scene={scene} />
+          </div>
+        )}
       </div>
     </div>
   );
@@ -166,7 +178,8 @@ function Head({ compared: { report }, scans }: ComparisonProps) {
 }
 
 /** Tables, folded. */
-function Particulars({ compared: { report } }: { compared: Compared }) {
+function Particulars({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
+  const { report } = compared;
   const beside = (["stress", "rest"] as const).flatMap(scan => {
     const { perfusion } = report[scan];
     return perfusion ? [[scan, perfusion] as [string, typeof perfusion]] : [];
@@ -215,7 +228,7 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
         <summary>Segments</summary>
         <p class="quiet">Per cent; stress is scaled to rest.</p>
         <div class="wide" tabIndex={0} role="region" aria-label="Segments">
-          <SegmentChanges report={report} />
+          <SegmentChanges compared={compared} scene={scene} />
         </div>
       </details>
       <details>
@@ -292,9 +305,16 @@ function Again({ result }: { result: Result }) {
   );
 }
 
-function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedScene; name: string }) {
+interface StageProps extends ComparisonProps {
+  scene: ComparedScene;
+  /** Whether the walls stand elsewhere. */
+  wide: boolean;
+}
+
+function Stage({ compared, scene, scans, wide }: StageProps) {
   const stage = useRef<HTMLElement>(null);
-  const [below, setBelow] = useState<"walls" | "slices">("walls");
+  const [chosen, setBelow] = useState<"walls" | "slices">("walls");
+  const below = wide && chosen === "walls" ? null : chosen;
   const [rows, setRows] = useState(false);
   const outlined = useWatched(scene.contours);
   const smooth = useWatched(scene.smooth);
@@ -323,10 +343,15 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
         </button>
         <span class="end">
           <span class="choice" role="group" aria-label="Below the slices">
-            <button type="button" aria-pressed={below === "walls"} onClick={() => setBelow("walls")}>
-              Walls in 3-D
-            </button>
-            <button type="button" aria-pressed={below === "slices"} onClick={() => setBelow("slices")}>
+            {!wide && (
+              <button type="button" aria-pressed={below === "walls"} onClick={() => setBelow("walls")}>
+                Walls in 3-D
+              </button>
+            )}
+            <button
+              type="button"
+              aria-pressed={below === "slices"}
+              onClick={() => setBelow(wide && below === "slices" ? "walls" : "slices")}>
               Slice, large
             </button>
           </span>
@@ -335,7 +360,7 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
             class="plain"
             aria-label="Screenshot"
             title="Screenshot"
-            onClick={() => stage.current && screenshot(stage.current, `${name} rest and stress`)}>
+            onClick={() => stage.current && screenshot(stage.current, `${nameOf(scans.stress)} rest and stress`)}>
             <svg class="icon" viewBox="0 0 20 20" aria-hidden="true">
               <path d="M3 6h3l1-2h6l1 2h3v10H3zM10 8a3 3 0 1 0 .01 0" />
             </svg>
@@ -343,14 +368,17 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
         </span>
       </div>
       {rows && <RowsOfSlices scene={scene} />}
+      {compared.report.beat && <ComparedPlayer compared={compared} scene={scene} scans={scans} />}
       <ComparedSlices compared={compared} scene={scene} />
-      <div class="below">
-        {below === "walls" ? (
-          <Walls compared={compared} scene={scene} />
-        ) : (
-          <LargePair compared={compared} scene={scene} />
-        )}
-      </div>
+      {below && (
+        <div class="below">
+          {below === "walls" ? (
+            <Walls compared={compared} scene={scene} />
+          ) : (
+            <LargePair compared={compared} scene={scene} />
+          )}
+        </div>
+      )}
     </section>
   );
 }

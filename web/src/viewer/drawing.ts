@@ -2,7 +2,7 @@
 
 import { counts } from "../words";
 import type { Lut } from "./colours";
-import { outline } from "./mesh";
+import { type Mesh, outline } from "./mesh";
 import { smooth as smoothSurface } from "./smooth";
 import { type Plane, letters, point } from "./plane";
 import type { Layer, Scene } from "./scene";
@@ -164,26 +164,41 @@ export function contours(
   for (const layer of layers) {
     if (!layer.shown) continue;
     const ends = layer.mesh
-      ? outline(smoothSurface(layer.mesh), plane, origin)
+      ? outlineOf(layer.mesh, plane, origin)
       : layer.mask
         ? marched(layer.mask, plane, origin, reach)
         : null;
-    if (!ends?.length) continue;
-    context.beginPath();
-    for (let n = 0; n < ends.length; n += 4) {
-      context.moveTo(ends[n]! * factor, ends[n + 1]! * factor);
-      context.lineTo(ends[n + 2]! * factor, ends[n + 3]! * factor);
-    }
-    context.lineCap = "round";
-    context.setLineDash(layer.dashed ? [2, 4] : []);
-    context.strokeStyle = "rgba(0,0,0,.55)";
-    context.lineWidth = 3.2;
-    context.stroke();
-    context.strokeStyle = layer.colour;
-    context.lineWidth = 1.7;
-    context.stroke();
-    context.setLineDash([]);
+    if (ends) strokeOutline(context, ends, factor, layer);
   }
+}
+
+/** Where the smooth surface through a mesh cuts a plane. */
+export function outlineOf(mesh: Mesh, plane: Plane, origin: Vec): Float32Array {
+  return outline(smoothSurface(mesh), plane, origin);
+}
+
+/** Strokes pairs of points of a slice, mm. */
+export function strokeOutline(
+  context: CanvasRenderingContext2D,
+  ends: Float32Array,
+  factor: number,
+  { colour, dashed = false }: Pick<Layer, "colour" | "dashed">,
+): void {
+  if (ends.length === 0) return;
+  context.beginPath();
+  for (let n = 0; n < ends.length; n += 4) {
+    context.moveTo(ends[n]! * factor, ends[n + 1]! * factor);
+    context.lineTo(ends[n + 2]! * factor, ends[n + 3]! * factor);
+  }
+  context.lineCap = "round";
+  context.setLineDash(dashed ? [2, 4] : []);
+  context.strokeStyle = "rgba(0,0,0,.55)";
+  context.lineWidth = 3.2;
+  context.stroke();
+  context.strokeStyle = colour;
+  context.lineWidth = 1.7;
+  context.stroke();
+  context.setLineDash([]);
 }
 
 /** The border of a mask in a plane, by Marching Squares at one half. */

@@ -61,15 +61,19 @@ export function voxelsOf(volume: Pick<Volume, "id" | "frames">, frame: number | 
   });
 }
 
-/** The voxels of every gate of a volume, one after the other; `told` has those that were read. */
+/**
+ * The voxels of every gate of a volume, one after the other; `told` has those that were read. `frames` says which volume
+ * of the files each gate is, where that is not its own number.
+ */
 export async function readGates(
   { id }: Pick<Volume, "id">,
   gates: number,
   told: (read: (Voxels | null)[]) => boolean,
+  frames?: number[],
 ): Promise<void> {
   const read: (Voxels | null)[] = new Array<null>(gates).fill(null);
   for (let gate = 0; gate < gates; gate++) {
-    read[gate] = await loadVoxels(`/v1/volumes/${id}/voxels.nii.gz?frame=${gate}`);
+    read[gate] = await loadVoxels(`/v1/volumes/${id}/voxels.nii.gz?frame=${frames?.[gate] ?? gate}`);
     if (!told([...read])) return;
   }
 }

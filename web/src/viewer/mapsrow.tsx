@@ -10,7 +10,7 @@ import { figureLut, isInValvePlane, placeOnMap, segmentAt, valueAt } from "./pol
 import { ColourBar } from "./wall";
 
 /** A map, its name and what it shows. */
-export type TitledMap = Pick<NamedMap, "name" | "short" | "map" | "figure">;
+export type TitledMap = Pick<NamedMap, "name" | "short" | "map" | "figure" | "lut">;
 
 /** The place on all maps: shares of width and height of a drawn one. */
 export type Cursor = Watched<[number, number] | null>;
@@ -19,8 +19,8 @@ export type Cursor = Watched<[number, number] | null>;
 const STEP = 0.03;
 
 /** The colours of a map: those that were chosen, of uptake; else the figure's own. */
-export function lutOf({ figure }: Pick<TitledMap, "figure">, chosen: Lut): Lut {
-  return figure === "uptake" ? chosen : figureLut(figure);
+export function lutOf({ figure, lut }: Pick<TitledMap, "figure" | "lut">, chosen: Lut): Lut {
+  return lut ?? (figure === "uptake" ? chosen : figureLut(figure));
 }
 
 /** The places of a colour bar's ends in words. */
@@ -54,30 +54,41 @@ export function UptakeColours({ lut: watched }: { lut: Watched<Lut> }) {
   );
 }
 
-interface MapProps {
+interface Places {
+  cursor: Cursor;
+  /** The place under the mouse, where views mark that: it goes before the cursor as long as it is there. */
+  pointed?: Cursor | undefined;
+}
+
+/** The place that is marked; the component is drawn again when it changes. */
+function useMarked({ cursor, pointed }: Places): [number, number] | null {
+  const pressed = useWatched(cursor);
+  return useWatched(pointed ?? cursor) ?? pressed;
+}
+
+interface MapProps extends Places {
   named: TitledMap;
   lut: Lut;
-  cursor: Cursor;
   /** Draws the map, with the cursor at a place of the wall. */
   draw: (context: CanvasRenderingContext2D, size: number, ratio: number, place: [number, number] | null) => void;
   /** What stands below the map; else its name and its scale. */
   children?: ComponentChildren;
 }
 
-export function SharedMap({ named, lut, cursor: watched, draw: drawn, children }: MapProps) {
+export function SharedMap({ named, lut, cursor, pointed, draw: drawn, children }: MapProps) {
   const { name, short, map } = named;
-  const cursor = useWatched(watched);
-  const place = cursor && placeOnMap(map, cursor[0], cursor[1], 1);
+  const marked = useMarked({ cursor, pointed });
+  const place = marked && placeOnMap(map, marked[0], marked[1], 1);
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
     const size = element.clientWidth;
     if (context) drawn(context, size, element.width / size, place || null);
   };
   const { canvas } = useCanvas(draw, () => () => undefined, map);
-  const go = (event: { offsetX: number; offsetY: number; currentTarget: HTMLCanvasElement }) => {
+  const placeOf = (event: { offsetX: number; offsetY: number; currentTarget: HTMLCanvasElement }) => {
     const size = event.currentTarget.clientWidth;
-    if (placeOnMap(map, event.offsetX, event.offsetY, size))
-      watched.value = [event.offsetX / size, event.offsetY / size];
+    const found = placeOnMap(map, event.offsetX, event.offsetY, size);
+    return found && ([event.offsetX / size, event.offsetY / size] as [number, number]);
   };
   return (
     <figure class="polar">
@@ -88,9 +99,13 @@ export function SharedMap({ named, lut, cursor: watched, draw: drawn, children }
         aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, map.digits, map.unit)}`).join(", ")}`}
         onPointerDown={event => {
           event.currentTarget.setPointerCapture(event.pointerId);
-          go(event);
+          cursor.value = placeOf(event) ?? cursor.value;
         }}
-        onPointerMove={event => event.buttons && go(event)}
+        onPointerMove={event => {
+          if (event.buttons) cursor.value = placeOf(event) ?? cursor.value;
+          if (pointed && event.pointerType !== "touch") pointed.value = placeOf(event);
+        }}
+        onPointerLeave={() => pointed && (pointed.value = null)}
         onKeyDown={event => {
           const ways: Record<string, [number, number]> = {
             ArrowUp: [0, -1],
@@ -101,9 +116,11 @@ export function SharedMap({ named, lut, cursor: watched, draw: drawn, children }
           const way = ways[event.key];
           if (!way) return;
           event.preventDefault();
-          const [x, y] = cursor ?? [0.5, 0.5];
-          const next: [number, number] = cursor ? [x + STEP * way[0], y + STEP * way[1]] : [x, y];
-          if (placeOnMap(map, next[0], next[1], 1)) watched.value = next;
+          if (pointed) pointed.value = null;
+          const from = cursor.value;
+          const [x, y] = from ?? [0.5, 0.5];
+          const next: [number, number] = from ? [x + STEP * way[0], y + STEP * way[1]] : [x, y];
+          if (placeOnMap(map, next[0], next[1], 1)) cursor.value = next;
         }}
       />
       <figcaption>
@@ -118,9 +135,22 @@ export function SharedMap({ named, lut, cursor: watched, draw: drawn, children }
   );
 }
 
-interface ReadoutProps {
+/** What a map says of a place; `signed`: of a difference what stress has more. */
+export function valueThere({ map, figure }: TitledMap, place: [number, number] | null, signed = false): string {
+  const found = place && placeOnMap(map, place[0], place[1], 1);
+  if (!found) return "";
+  if (isInValvePlane(map, ...found)) return "valve plane";
+  const digits = ["uptake", "difference", "phase", "thickening"].includes(figure) ? 0 : 1;
+  if (!signed) return number(valueAt(map, ...found), digits, map.unit);
+  // That of the uptake is the service's, of rest less stress.
+  const value = (figure === "difference" ? -1 : 1) * valueAt(map, ...found);
+  return `${Number(value.toFixed(digits)) > 0 ? "+" : ""}${number(value, digits, map.unit)}`;
+}
+
+interface ReadoutProps extends Places {
   maps: TitledMap[];
-  cursor: Cursor;
+  /** The map that says which segment a place is in; else the first one. */
+  by?: TitledMap | undefined;
   /** What is said while nothing is chosen. */
   hint: string;
   /** Further rows of a segment. */
@@ -128,20 +158,13 @@ interface ReadoutProps {
 }
 
 /** What all maps say of the place of the cursor. */
-export function Readout({ maps, cursor: watched, hint, more }: ReadoutProps) {
-  const cursor = useWatched(watched);
-  const rows = maps.flatMap((named): [string, string][] => {
-    const { short, map, figure } = named;
-    const place = cursor && placeOnMap(map, cursor[0], cursor[1], 1);
-    if (!place) return [];
-    const here = isInValvePlane(map, ...place)
-      ? "valve plane"
-      : number(valueAt(map, ...place), figure === "uptake" || figure === "difference" ? 0 : 1, map.unit);
-    return [[short, here]];
-  });
-  const first = maps[0];
-  const place = first && cursor && placeOnMap(first.map, cursor[0], cursor[1], 1);
-  const segment = place ? segmentAt(first.map, ...place) : undefined;
+export function Readout({ maps, by = maps[0], cursor, pointed, hint, more }: ReadoutProps) {
+  const marked = useMarked({ cursor, pointed });
+  const rows = maps
+    .map((named): [string, string] => [named.short, valueThere(named, marked)])
+    .filter(([, here]) => here !== "");
+  const place = by && marked && placeOnMap(by.map, marked[0], marked[1], 1);
+  const segment = place ? segmentAt(by.map, ...place) : undefined;
   return (
     <div class="readout" role="status" aria-label="At the cursor">
       {segment ? (

@@ -181,6 +181,50 @@ export function valueAt(map: DrawnMap, rows: number, columns: number): number {
   return weight > 0.3 ? sum / weight : NaN;
 }
 
+/** A map turned about its middle by so many degrees, as the service turns that of a scan: its segments stay in place. */
+export function turnedMap(map: DrawnMap, degrees: number): DrawnMap {
+  if (degrees === 0) return map;
+  const by = (degrees / 360) * map.columns;
+  const nearest = (column: number) => columnAt(map, column + 0.5 + by);
+  const columns = Array.from({ length: map.columns }, (_, column) => column);
+  const value = (row: number, column: number) => {
+    const found = valueAt(map, row + 0.5, column + 0.5 + by);
+    return Number.isNaN(found) ? null : found;
+  };
+  return {
+    ...map,
+    values: map.values.map((_, row) => columns.map(column => value(row, column))),
+    level_ends: columns.map(column => map.level_ends[nearest(column)]!),
+    states: map.states?.map(row => columns.map(column => row[nearest(column)]!)) ?? null,
+  };
+}
+
+/**
+ * What `one` has more than `other` at the same places of the drawn maps, from `-range` to `range`; on the ring of
+ * `other` for those of phases.
+ */
+export function differenceMap(one: DrawnMap, other: DrawnMap, range: number): DrawnMap {
+  const less = (a: number, b: number) => (one.cyclic ? ((a - b + 540) % 360) - 180 : a - b);
+  const value = (row: number, column: number) => {
+    const [rows, columns] = [row + 0.5, column + 0.5];
+    const place = placeOnMap(one, ...onMap(other, rows, columns), 1);
+    const found = place ? less(valueAt(one, ...place), valueAt(other, rows, columns)) : NaN;
+    return Number.isNaN(found) ? null : found;
+  };
+  const means = new Map(one.segments.map(segment => [segment.number, segment.mean]));
+  return {
+    ...other,
+    values: other.values.map((row, at) => row.map((_, column) => value(at, column))),
+    segments: other.segments.map(segment => {
+      const mean = means.get(segment.number);
+      return { ...segment, mean: mean == null || segment.mean === null ? null : less(mean, segment.mean) };
+    }),
+    range: [-range, range],
+    below: null,
+    cyclic: false,
+  };
+}
+
 /** The lines of the wall's coordinates, as the service lays them through a mesh. */
 export class WallFrame {
   private readonly frame;

@@ -1,6 +1,7 @@
 // What the views of one scan share: the place looked at, the window, the layers.
 
 import { Watched } from "../state";
+import { Beating, gateAt } from "./beating";
 import type { Camera } from "./camera";
 import type { Lut } from "./colours";
 import type { Mesh } from "./mesh";
@@ -49,7 +50,7 @@ export interface View {
   middle: Vec | null;
 }
 
-export class Scene {
+export class Scene extends Beating {
   readonly cursor: Watched<Vec>;
   readonly window: Watched<Window>;
   readonly lut: Watched<Lut>;
@@ -65,12 +66,6 @@ export class Scene {
   /** From where the walls are seen, the same for all; `turned` counts its changes. */
   camera: Camera | null = null;
   readonly turned = new Watched<number>(0);
-  /** The moment of the beat, in turns of its cycle; null where nothing beats. */
-  readonly moment = new Watched<number | null>(null);
-  /** The moment in the middle of the gate that is shown: it changes with the gate. */
-  readonly gate = new Watched<number | null>(null);
-  /** Counts how often the beat was stopped at a moment. */
-  readonly held = new Watched<number>(0);
   /** The voxels of the gates, as far as they were read. */
   readonly gates = new Watched<(Voxels | null)[]>([]);
   /** The brightest place of the wall in any gate, over that of all gates together; null until all gates were read. */
@@ -82,6 +77,7 @@ export class Scene {
     lut: Lut,
     wallLut: Lut,
   ) {
+    super();
     const { voxels } = this;
     this.cursor = new Watched<Vec>(voxels.middle);
     // A scale with an intercept may miss its zero by a rounding error.
@@ -134,18 +130,6 @@ export class Scene {
     });
   }
 
-  /** Shows a moment of a beat of so many gates, and stops there. */
-  hold(turns: number, gates: number): void {
-    this.held.value += 1;
-    this.goTo(turns, gates);
-  }
-
-  /** Shows a moment of a beat of so many gates. */
-  goTo(turns: number, gates: number): void {
-    this.gate.value = (Math.floor(turns * gates) + 0.5) / gates;
-    this.moment.value = turns;
-  }
-
   /** The same views at another moment of the beat, whatever happens to this one. */
   at(turns: number): Scene {
     const scene = Object.create(this) as Scene;
@@ -162,9 +146,4 @@ export class Scene {
     const heart = this.heart.value;
     return heart ? ([0, 1, 2].map(n => (heart.base[n]! + heart.apex[n]!) / 2) as unknown as Vec) : this.voxels.middle;
   }
-}
-
-/** What belongs to the gate at a moment of the cycle. */
-function gateAt<T>(gates: T[], turns: number | null): T | undefined {
-  return turns === null ? undefined : gates[Math.min(gates.length - 1, Math.floor(turns * gates.length))];
 }
