@@ -507,6 +507,89 @@ export async function comparisons(tools) {
     await own.stop();
   });
 
+  await check("a heart is corrected in the comparison by handles and by two points of the valve plane", async () => {
+    const { stress, rest } = data();
+    const own = await service();
+    const order = new FormData();
+    for (const [role, path] of Object.entries({ stress, rest }))
+      order.append(role, new Blob([readFileSync(path)]), `${role}.dcm`);
+    const made = await fetch(`${own.address}/v1/comparisons`, {
+      method: "POST",
+      body: order,
+      headers: { prefer: "wait=300" },
+    });
+    assert.equal(made.status, 200, await made.clone().text());
+    const [{ id }] = (await read(own.address, "/v1/comparisons")).comparisons;
+    const before = await reportOf(own.address, id);
+    const { base, apex } = before.stress.long_axis;
+    const length = Math.hypot(...apex.map((value, axis) => value - base[axis]));
+    for (const [name, width, height] of [
+      ["400", 400, 850],
+      ["1920", 1920, 1080],
+    ]) {
+      const { page, faults, close } = await tab(browser, `${own.address}/#/comparison/${id}`, { width, height });
+      await displayed(page);
+      await page.getByRole("button", { name: "Correct stress" }).click();
+      const panel = page.getByRole("group", { name: "Correct stress by hand" });
+      const told = panel.getByText(/^Changed: |^Nothing changed/);
+      assert.equal(await told.textContent(), "Nothing changed yet");
+      assert.ok(await panel.getByRole("button", { name: "Fit and compare again" }).isDisabled());
+      const slices = page.locator(".compared-slices");
+      await slices.scrollIntoViewIfNeeded();
+      const box = await slices.boundingBox();
+      const aside = box.width < 500 ? 38 : 52;
+      const cell = Math.min((box.width - aside) / 8, (box.height - 3 * 19) / 6);
+      const left = aside + (box.width - aside - 8 * cell) / 2;
+      /** A place in the fourth vertical long-axis slice of stress, mm from its middle. */
+      const at = (right, down) => ({
+        x: left + 3.5 * cell + (right * cell) / 114.4,
+        y: 2 * 19 + 2.5 * cell + (down * cell) / 114.4,
+      });
+      const drag = async (from, to) => {
+        const [a, b] = [at(...from), at(...to)];
+        await page.mouse.move(box.x + a.x, box.y + a.y);
+        await page.mouse.down();
+        await page.mouse.move(box.x + b.x, box.y + b.y, { steps: 3 });
+        await page.mouse.up();
+      };
+      const plain = await looked(slices);
+      const distance = panel.getByLabel("Base, mm from the centre");
+      const first = Number(await distance.inputValue());
+      // The centre stands at 45 hundredths of the way from the base to the apex, which is half of the length away.
+      const centre = length / 2 - (first * 0.55) / 0.45;
+      await drag([centre, 0], [centre, 12]);
+      assert.equal(await told.textContent(), "Changed: center");
+      await page.waitForTimeout(200);
+      assert.notDeepEqual(await looked(slices), plain, "the wall is shown where it goes");
+      await panel.getByRole("button", { name: "Undo changes" }).click();
+      assert.equal(await told.textContent(), "Nothing changed yet");
+      // The valve plane goes through two points, eight millimetres nearer to the apex.
+      await panel.getByRole("button", { name: "Valve plane by two points" }).click();
+      const valve = centre - first + 8;
+      await slices.click({ position: at(valve, -24) });
+      assert.match(await panel.textContent(), /Press on the other side/);
+      await slices.click({ position: at(valve, 24) });
+      await page.waitForTimeout(200);
+      assert.equal(await told.textContent(), "Changed: base");
+      assert.ok(Math.abs(Number(await distance.inputValue()) - (first - 8)) <= 2, await distance.inputValue());
+      await look(page, `comparison-correct-${name}`);
+      if (name === "1920") {
+        await panel.getByRole("button", { name: "Fit and compare again" }).click();
+        await page.waitForFunction(id => /cmp_/.test(location.hash) && !location.hash.includes(id), id);
+        await displayed(page);
+        assert.match(await page.textContent(".comparison header"), /corrected by hand: base/);
+        const [again] = (await read(own.address, "/v1/comparisons")).comparisons;
+        assert.equal(again.parameters.stress_base.length, 3);
+        assert.equal(again.parameters.stress_center ?? null, null);
+        assert.equal(again.parameters.kept_model, before.stress.template);
+        assert.equal(await page.locator(".comparison .facts .warning").count(), 0);
+      }
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
+  });
+
   await check("normal limits are added, chosen, always called simulated, and erased", async () => {
     const { "plain stress": plainStress, "plain rest": plainRest, limits } = data();
     const own = await service();

@@ -4,9 +4,10 @@
 import { Watched, useWatched } from "../state";
 import { Beating } from "./beating";
 import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";
-import { type Row, SLICE_MM, STANDARD_ROWS } from "./compared";
+import { type Row, type WhichScan, SLICE_MM, STANDARD_ROWS } from "./compared";
 import type { Gates, OfBoth } from "./comparedgates";
 import type { Loaded } from "./loaded";
+import type { Edit } from "./scene";
 import type { PolarLabels } from "./polar";
 import { type Vec, unit } from "./vector";
 
@@ -38,6 +39,10 @@ export class ComparedScene extends Beating {
   readonly gates = new Watched<OfBoth<Gates | null>>({ stress: null, rest: null });
   /** The stored beats of both scans that belong to the comparison. */
   readonly beats = new Watched<OfBoth<Loaded | null>>({ stress: null, rest: null });
+  /** The heart that somebody corrects, as far as it was moved. */
+  readonly edit = new Watched<{ scan: WhichScan; edit: Edit } | null>(null);
+  /** Whether the valve plane is being put through two points, and the first of them with the kind of its slice. */
+  readonly valve = new Watched<{ first: { kind: number; place: Vec } | null } | null>(null);
   readonly written = new Watched<Written>("means");
   /** From where both walls are seen, in directions of the heart: lateral, anterior, apex. */
   readonly seen = new Watched<{ toward: Vec; up: Vec }>(FROM_FRONT);
@@ -62,7 +67,7 @@ export class ComparedScene extends Beating {
 
   /** Everything that is marked on slices. */
   watchMarks(act: () => void): () => void {
-    return watchAll([this.chosen, this.cursor, this.pointed], act);
+    return watchAll([this.chosen, this.cursor, this.pointed, this.edit, this.valve], act);
   }
 
   watch(act: () => void): () => void {

@@ -3,14 +3,25 @@
 import { useRef } from "preact/hooks";
 import { useWatched } from "../state";
 import { useCanvas } from "./canvas";
-import { type Compared, type ComparedHeart, KINDS, type Row, sliceAt, spacingOf, wallFrameOf } from "./compared";
+import {
+  type Compared,
+  type ComparedHeart,
+  KINDS,
+  type Row,
+  type WhichScan,
+  sliceAt,
+  spacingOf,
+  wallFrameOf,
+} from "./compared";
 import { type ShownHeart, heartAt } from "./comparedgates";
 import type { ComparedScene } from "./comparedscene";
-import { type Look, label, outlineOf, paintVoxels, strokeOutline } from "./drawing";
+import { type Look, drawHandles, label, outlineOf, paintVoxels, strokeOutline } from "./drawing";
+import { type Handle, dragged, handleAt, movedMesh } from "./handles";
 import type { Mesh } from "./mesh";
-import { type Plane, point } from "./plane";
-import { placeOnMap, onMap } from "./polar";
-import { type Vec, dot, norm, sub } from "./vector";
+import { type Axis, type Plane, point } from "./plane";
+import { WallFrame, placeOnMap, onMap } from "./polar";
+import type { Edit } from "./scene";
+import { type Vec, dot, mix, norm, sub } from "./vector";
 
 /** CSS pixels left of the slices for the name of the scan, and above each kind for its own. */
 const [ASIDE, ABOVE] = [52, 19];
@@ -149,10 +160,77 @@ function markSlices(
       }
     }
   }
+  markCorrection(context, compared, scene, { cell, left, top }, factor);
   const { kind, number } = scene.chosen.value;
   context.strokeStyle = MARK;
   context.lineWidth = 1.5;
   context.strokeRect(left + number * cell + 1, top(kind, 0) + 1, cell - 2, 2 * cell - 2);
+}
+
+/** The colour of what a correction shows before it is fitted. */
+const PREVIEW = { colour: "#5cc8ff" };
+/** Cells of at least so many CSS pixels have room for the names of handles. */
+const NAMED_CELL = 190;
+
+const moved = new WeakMap<Edit, Mesh>();
+
+/** The wall of a heart where somebody has moved it to; null where nothing was moved. */
+function preview(one: ComparedHeart, edit: Edit): Mesh | null {
+  if (!one.heart || !["center", "axis", "base"].some(name => edit.changed.has(name as "center"))) return null;
+  const { base } = new WallFrame(one.mesh, one.heart, 1, 1);
+  const found = moved.get(edit) ?? movedMesh(one.mesh, { ...edit, base, apex: one.heart.apex }, edit);
+  moved.set(edit, found);
+  return found;
+}
+
+/** The slice of a row that is nearest to a place: that with the handles. */
+function nearestSlice(
+  { heart, scan }: { heart: Axis; scan: WhichScan },
+  kind: number,
+  rows: Row[],
+  place: Vec,
+): number {
+  const away = Array.from({ length: rows[kind]!.count }, (_, n) => {
+    const { plane, origin } = sliceAt({ heart, scan }, kind, n, rows);
+    return Math.abs(dot(sub(place, origin), plane.normal));
+  });
+  return away.indexOf(Math.min(...away));
+}
+
+/** Handles and preview of a correction on the rows of its scan. */
+function markCorrection(
+  context: CanvasRenderingContext2D,
+  compared: Compared,
+  scene: ComparedScene,
+  { cell, left, top }: Pick<Laid, "cell" | "left" | "top">,
+  factor: number,
+): void {
+  const now = scene.edit.value;
+  const one = now && compared[now.scan];
+  if (!now || !one?.heart) return;
+  const heart = { heart: one.heart, scan: one.scan };
+  const rows = scene.rows.value;
+  const wall = preview(one, now.edit);
+  for (const kind of KINDS.keys()) {
+    const held = nearestSlice(heart, kind, rows, now.edit.center);
+    for (let n = 0; n < rows[kind]!.count; n++) {
+      const { plane, origin } = sliceAt(heart, kind, n, rows);
+      const flat = (place: Vec): [number, number] => {
+        const way = sub(place, origin);
+        return [dot(way, plane.right) * factor, dot(way, plane.down) * factor];
+      };
+      context.save();
+      context.beginPath();
+      context.rect(left + n * cell, top(kind, one.scan === "stress" ? 0 : 1), cell, cell);
+      context.clip();
+      context.translate(left + (n + 0.5) * cell, top(kind, one.scan === "stress" ? 0 : 1) + cell / 2);
+      if (wall) strokeOutline(context, contourOf(wall, plane, origin), factor, PREVIEW);
+      const first = scene.valve.value?.first;
+      if (first?.kind === kind) ring(context, ...flat(first.place), 3);
+      if (n === held) drawHandles(context, now.edit, plane, flat, { knows: one.oriented, names: cell >= NAMED_CELL });
+      context.restore();
+    }
+  }
 }
 
 function ring(context: CanvasRenderingContext2D, x: number, y: number, radius: number): void {
@@ -217,9 +295,47 @@ function hitOf(
   return null;
 }
 
+/** CSS pixels from a handle within which a press takes it. */
+const REACH = 14;
+
+/** The slice under a pointer, and the place there. */
+function placeOfHit(
+  scene: ComparedScene,
+  { one, kind, number, right, down }: Hit,
+): { plane: Plane; place: Vec } | null {
+  if (!one.heart) return null;
+  const { plane, origin } = sliceAt({ heart: one.heart, scan: one.scan }, kind, number, scene.rows.value);
+  return { plane, place: point(plane, origin, right, down) };
+}
+
+/** What a press does to a correction: it takes a handle, or places a point of the valve plane. */
+function correct(scene: ComparedScene, hit: Hit, reach: number): Handle | "placed" | null {
+  const now = scene.edit.value;
+  const found = placeOfHit(scene, hit);
+  if (!now || !found || hit.one.scan !== now.scan) return null;
+  const { plane, place } = found;
+  const valve = scene.valve.value;
+  if (!valve) return handleAt(now.edit, plane, place, reach, hit.one.oriented);
+  // In the short axis, the valve plane is no line.
+  if (hit.kind === 0) return null;
+  if (valve.first?.kind !== hit.kind) scene.valve.value = { first: { kind: hit.kind, place } };
+  else {
+    scene.edit.value = { ...now, edit: dragged(now.edit, plane, "base", mix(valve.first.place, place, 0.5)) };
+    scene.valve.value = null;
+  }
+  return "placed";
+}
+
+function drag(scene: ComparedScene, handle: Handle, hit: Hit): void {
+  const now = scene.edit.value;
+  const found = placeOfHit(scene, hit);
+  if (now && found) scene.edit.value = { ...now, edit: dragged(now.edit, found.plane, handle, found.place) };
+}
+
 export function ComparedSlices({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
   const { kind, number } = useWatched(scene.chosen);
   const rows = useWatched(scene.rows);
+  const correcting = useWatched(scene.edit) !== null;
   // The slices without marks: these follow the mouse, and slices are slow to paint.
   const painted = useRef<{ canvas: HTMLCanvasElement; fresh: boolean } | null>(null);
   const draw = (element: HTMLCanvasElement) => {
@@ -253,13 +369,32 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
     },
     compared,
   );
+  const held = useRef<{ handle: Handle; hit: Hit } | null>(null);
   const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
     const hit = hitOf(event, compared, scene);
     if (!hit) return;
+    const mm = scene.across.value / laid(event.currentTarget.clientWidth, event.currentTarget.clientHeight, rows).cell;
+    const took = correct(scene, hit, REACH * mm);
+    if (took) {
+      event.currentTarget.setPointerCapture(event.pointerId);
+      held.current = took === "placed" ? null : { handle: took, hit };
+      return;
+    }
     scene.chosen.value = { kind: hit.kind, number: hit.number };
     scene.cursor.value = onWall(scene, hit.one, hit, hit.right, hit.down) ?? scene.cursor.value;
   };
   const pointTo = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
+    if (held.current) {
+      const { handle, hit } = held.current;
+      const { clientWidth: width, clientHeight: height } = event.currentTarget;
+      const { cell, left, top } = laid(width, height, rows);
+      const mm = scene.across.value / cell;
+      const row = hit.one.scan === "stress" ? 0 : 1;
+      const right = (event.offsetX - left - (hit.number + 0.5) * cell) * mm;
+      const down = (event.offsetY - top(hit.kind, row) - cell / 2) * mm;
+      drag(scene, handle, { ...hit, right, down });
+      return;
+    }
     if (event.pointerType === "touch") return;
     const hit = hitOf(event, compared, scene);
     scene.pointed.value = hit && onWall(scene, hit.one, hit, hit.right, hit.down, NEAR_WALL);
@@ -272,7 +407,7 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
   return (
     <canvas
       ref={canvas}
-      class="compared-slices"
+      class={`compared-slices${correcting ? " correcting" : ""}`}
       tabIndex={0}
       role="slider"
       aria-label="Slices of stress above those of rest; arrow keys choose a level"
@@ -281,6 +416,8 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
       aria-valuenow={rows.slice(0, kind).reduce((sum, row) => sum + row.count, 0) + number + 1}
       aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
       onPointerDown={press}
+      onPointerUp={() => (held.current = null)}
+      onPointerCancel={() => (held.current = null)}
       onPointerMove={pointTo}
       onPointerLeave={() => (scene.pointed.value = null)}
       onKeyDown={event => {

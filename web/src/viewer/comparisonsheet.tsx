@@ -3,6 +3,7 @@
 import type { Volume } from "../api";
 import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
+import { correctedWords } from "./comparedcorrection";
 import {
   Headlines,
   Outdated,
@@ -85,6 +86,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
           <span key={scan}>
             <b>{scan === "stress" ? "Stress" : "Rest"}</b> {nameOf(scans[scan])}
             {madeWith(report[scan]) && ` · ${madeWith(report[scan])}`}
+            {correctedWords(result, scan) && ` · corrected by hand: ${correctedWords(result, scan)}`}
           </span>
         ))}
         <SimulatedNote report={report} />

@@ -30,6 +30,7 @@ import {
 } from "./comparedfacts";
 import { RowsOfSlices, WindowOfSlices } from "./comparedlook";
 import { ComparedBeats, ComparedPlayer } from "./comparedbeat";
+import { ComparedCorrection, CorrectScan } from "./comparedcorrection";
 import { ComparedMaps } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
@@ -128,7 +129,8 @@ function Comparison({ compared, scans }: ComparisonProps) {
   return (
     <div class="comparison">
       <aside class="facts" aria-label="Figures">
-        <Head compared={compared} scans={scans} />
+        <Head compared={compared} scans={scans} scene={scene} />
+        <ComparedCorrection compared={compared} scene={scene} scans={scans} />
         <Takeaways result={compared.result} volume={scans.stress} />
         <Outdated made={compared.result} />
         {areNotComparable(compared.report) && <Reasons report={compared.report} />}
@@ -155,7 +157,8 @@ function Comparison({ compared, scans }: ComparisonProps) {
   );
 }
 
-function Head({ compared: { report }, scans }: ComparisonProps) {
+function Head({ compared, scans, scene }: ComparisonProps & { scene: ComparedScene }) {
+  const { report } = compared;
   return (
     <header>
       <h1>Rest and stress</h1>
@@ -170,7 +173,8 @@ function Head({ compared: { report }, scans }: ComparisonProps) {
           <a href={`#/scan/${scans[scan].id}`} title={nameOf(scans[scan])}>
             {cut(nameOf(scans[scan]))}
           </a>
-          {madeWith(report[scan]) && <span class="quiet"> {madeWith(report[scan])}</span>}
+          {madeWith(report[scan]) && <span class="quiet"> {madeWith(report[scan])}</span>}{" "}
+          <CorrectScan compared={compared} scene={scene} scan={scan} />
         </p>
       ))}
     </header>

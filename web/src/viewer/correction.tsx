@@ -7,7 +7,7 @@ import { useWatched } from "../state";
 import { isGated, kindOf } from "../words";
 import { file } from "../work";
 import type { Loaded } from "./loaded";
-import { frameOf } from "./plane";
+import { type Axis, frameOf } from "./plane";
 import { WallFrame } from "./polar";
 import type { Edit, Scene } from "./scene";
 import type { Triple } from "./shown";
@@ -59,38 +59,6 @@ export function Correction({ scene, volume, shown }: Props) {
 
   const kind = shown?.beat || (!shown && isGated(volume)) ? "beat" : "segmentation";
   const corrected = shown && kindOf(shown.result.id) === kind ? shown : null;
-  const axis = unit(sub(edit.apex, edit.base));
-  const centreTo = (center: Vec) => {
-    const way = sub(center, edit.center);
-    scene.edit.value = {
-      ...edit,
-      center,
-      base: add(edit.base, way),
-      apex: add(edit.apex, way),
-      changed: new Set(edit.changed).add("center"),
-    };
-  };
-  /** The base so far from the centre, along the axis. */
-  const baseTo = (distance: number) => {
-    if (!(distance > 5 && distance < 120)) return;
-    scene.edit.value = {
-      ...edit,
-      base: sub(edit.center, scale(axis, distance)),
-      changed: new Set(edit.changed).add("base"),
-    };
-  };
-  const axisTo = (wanted: Vec) => {
-    if (!(Math.hypot(...wanted) > 1e-6)) return;
-    const way = unit(wanted);
-    const length = Math.hypot(...sub(edit.apex, edit.base));
-    const base = sub(edit.center, scale(way, 0.45 * length));
-    scene.edit.value = {
-      ...edit,
-      base,
-      apex: add(base, scale(way, length)),
-      changed: new Set(edit.changed).add("axis"),
-    };
-  };
   const send = async () => {
     setProblem(null);
     setSending(true);
@@ -101,23 +69,14 @@ export function Correction({ scene, volume, shown }: Props) {
       // Another heart may win from another place; the one that was looked at is kept.
       const kept = corrected?.report?.template ?? corrected?.beat?.report.template;
       if (kept) next["kept_model"] = kept;
-      if (edit.changed.has("center")) {
-        next["center"] = edit.center.map(value => Math.round(value * 100) / 100);
+      const moved = correctionOf(edit, scene.heart.value);
+      Object.assign(next, moved);
+      if (moved.center) {
         delete next["seed_point"];
         delete next["box"];
       }
-      if (edit.changed.has("axis")) next["axis"] = axis.map(value => Math.round(value * 1e4) / 1e4);
-      if (edit.changed.has("base")) next["base"] = edit.base.map(value => Math.round(value * 100) / 100);
       if (reader) next["reader"] = reader;
       else delete next["reader"];
-      if (edit.changed.has("roll") && scene.heart.value) {
-        // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that
-        // it had.
-        const { axis: way, anterior } = frameOf(scene.heart.value);
-        next["segments_from"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(
-          value => Math.round(value * 1e4) / 1e4,
-        );
-      }
       const changed = [
         ...edit.changed,
         ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []),
@@ -138,47 +97,12 @@ export function Correction({ scene, volume, shown }: Props) {
         that it points to the anterior wall: turning only renames segments.{" "}
         {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.
       </p>
-      <TripleField
-        name="Centre, mm (L, P, S)"
-        value={edit.center}
-        digits={1}
-        wrong={problem?.field === "center"}
-        onValue={centreTo}
+      <EditFields
+        edit={edit}
+        onEdit={next => (scene.edit.value = next)}
+        cursor={cursor}
+        wrong={problem?.field ?? null}
       />
-      <button type="button" onClick={() => centreTo(cursor)}>
-        Centre at the cursor
-      </button>
-      <TripleField
-        name="Axis, base to apex"
-        value={axis}
-        digits={3}
-        wrong={problem?.field === "axis"}
-        onValue={axisTo}
-      />
-      <label class="field">
-        Base, mm from the centre
-        <NumberInput
-          step={1}
-          text={dot(sub(edit.center, edit.base), axis).toFixed(0)}
-          aria-invalid={problem?.field === "base" || undefined}
-          onNumber={baseTo}
-        />
-      </label>
-      <label class="field">
-        Turn about the axis, °
-        <input
-          type="number"
-          step={5}
-          value={edit.roll}
-          onInput={event =>
-            (scene.edit.value = {
-              ...edit,
-              roll: Number(event.currentTarget.value) || 0,
-              changed: new Set(edit.changed).add("roll"),
-            })
-          }
-        />
-      </label>
       {kind === "segmentation" && (
         <label class="field">
           Wall shown
@@ -207,12 +131,123 @@ export function Correction({ scene, volume, shown }: Props) {
           Undo changes
         </button>
       </div>
-      <p class="quiet" role="status">
-        {edit.changed.size ? `Changed: ${[...edit.changed].join(", ")}` : "Nothing changed yet"}
-      </p>
+      <Changed edit={edit} />
     </div>
   );
 }
+
+interface FieldsProps {
+  edit: Edit;
+  onEdit: (next: Edit) => void;
+  /** Where the centre may be put by a press. */
+  cursor?: Vec;
+  /** The parameter that the service has refused. */
+  wrong: string | null;
+}
+
+/** The correction in numbers. */
+export function EditFields({ edit, onEdit, cursor, wrong }: FieldsProps) {
+  const axis = unit(sub(edit.apex, edit.base));
+  const centreTo = (center: Vec) => {
+    const way = sub(center, edit.center);
+    onEdit({
+      ...edit,
+      center,
+      base: add(edit.base, way),
+      apex: add(edit.apex, way),
+      changed: new Set(edit.changed).add("center"),
+    });
+  };
+  /** The base so far from the centre, along the axis. */
+  const baseTo = (distance: number) => {
+    if (!(distance > 5 && distance < 120)) return;
+    onEdit({
+      ...edit,
+      base: sub(edit.center, scale(axis, distance)),
+      changed: new Set(edit.changed).add("base"),
+    });
+  };
+  const axisTo = (wanted: Vec) => {
+    if (!(Math.hypot(...wanted) > 1e-6)) return;
+    const way = unit(wanted);
+    const length = Math.hypot(...sub(edit.apex, edit.base));
+    const base = sub(edit.center, scale(way, 0.45 * length));
+    onEdit({
+      ...edit,
+      base,
+      apex: add(base, scale(way, length)),
+      changed: new Set(edit.changed).add("axis"),
+    });
+  };
+  return (
+    <>
+      <TripleField
+        name="Centre, mm (L, P, S)"
+        value={edit.center}
+        digits={1}
+        wrong={wrong === "center"}
+        onValue={centreTo}
+      />
+      {cursor && (
+        <button type="button" onClick={() => centreTo(cursor)}>
+          Centre at the cursor
+        </button>
+      )}
+      <TripleField name="Axis, base to apex" value={axis} digits={3} wrong={wrong === "axis"} onValue={axisTo} />
+      <label class="field">
+        Base, mm from the centre
+        <NumberInput
+          step={1}
+          text={dot(sub(edit.center, edit.base), axis).toFixed(0)}
+          aria-invalid={wrong === "base" || undefined}
+          onNumber={baseTo}
+        />
+      </label>
+      <label class="field">
+        Turn about the axis, °
+        <input
+          type="number"
+          step={5}
+          value={edit.roll}
+          onInput={event =>
+            onEdit({
+              ...edit,
+              roll: Number(event.currentTarget.value) || 0,
+              changed: new Set(edit.changed).add("roll"),
+            })
+          }
+        />
+      </label>
+    </>
+  );
+}
+
+/** What was changed so far. */
+export function Changed({ edit }: { edit: Edit }) {
+  return (
+    <p class="quiet" role="status">
+      {edit.changed.size ? `Changed: ${[...edit.changed].join(", ")}` : "Nothing changed yet"}
+    </p>
+  );
+}
+
+const rounded = (value: Vec, digits: number) => value.map(part => Math.round(part * 10 ** digits) / 10 ** digits);
+
+/** What the service is told of a correction: of what was changed, the parameters. */
+export function correctionOf(edit: Edit, heart: Axis | null): Partial<Record<Correctable, number[]>> {
+  const moved: Partial<Record<Correctable, number[]>> = {};
+  if (edit.changed.has("center")) moved.center = rounded(edit.center, 2);
+  if (edit.changed.has("axis")) moved.axis = rounded(unit(sub(edit.apex, edit.base)), 4);
+  if (edit.changed.has("base")) moved.base = rounded(edit.base, 2);
+  if (edit.changed.has("roll") && heart) {
+    // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that it had.
+    const { axis, anterior } = frameOf(heart);
+    moved.segments_from = rounded(turned(anterior, axis, (edit.roll * Math.PI) / 180), 4);
+  }
+  return moved;
+}
+
+type Correctable = "center" | "axis" | "base" | "segments_from";
 
 interface TripleFieldProps {
   name: string;

@@ -4,9 +4,10 @@ import { counts } from "../words";
 import type { Lut } from "./colours";
 import { type Mesh, outline } from "./mesh";
 import { smooth as smoothSurface } from "./smooth";
+import { rollKnob } from "./handles";
 import { type Plane, letters, point } from "./plane";
-import type { Layer, Scene } from "./scene";
-import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
+import type { Edit, Layer, Scene } from "./scene";
+import { type Vec, add, dot, scale, sub, unit } from "./vector";
 import type { Voxels } from "./volume";
 
 export interface SliceStyle {
@@ -287,7 +288,8 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
     }
     context.stroke();
   }
-  if (style.cursor && scene.edit.value && scene.tool.value === "correct") handles(context, scene, plane, flat);
+  if (style.cursor && scene.edit.value && scene.tool.value === "correct")
+    drawHandles(context, scene.edit.value, plane, flat, { knows: scene.heart.value !== null, names: true });
   context.restore();
   if (!style.letters) return;
   const [left, right, top, bottom] = plane.sides ?? [
@@ -328,15 +330,23 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
 /** Half the length of the line that stands for the plane of the base, mm. */
 const HALF_BASE = 32;
 
-function handles(
+export interface HandlesStyle {
+  /** Whether the sides are known, so that they can be turned. */
+  knows: boolean;
+  /** Whether there is room for large handles with their names. */
+  names: boolean;
+}
+
+/** Draws the handles of a correction; `flat` is where a place lies in the slice. */
+export function drawHandles(
   context: CanvasRenderingContext2D,
-  scene: Scene,
+  edit: Edit,
   plane: Plane,
   flat: (place: Vec) => [number, number],
+  { knows, names }: HandlesStyle,
 ): void {
-  const edit = scene.edit.value;
-  if (!edit) return;
-  const knob = rollKnob(scene, plane);
+  const radius = names ? 7 : 5;
+  const knob = knows ? rollKnob(edit, plane) : null;
   const [base, apex, center] = [flat(edit.base), flat(edit.apex), flat(edit.center)];
   const line = (a: [number, number], b: [number, number]) => {
     for (const [stroke, width] of [
@@ -354,13 +364,13 @@ function handles(
   line(base, apex);
   const dot_ = ([x, y]: [number, number], fill: string, name: string) => {
     context.beginPath();
-    context.arc(x, y, 7, 0, 2 * Math.PI);
+    context.arc(x, y, radius, 0, 2 * Math.PI);
     context.fillStyle = fill;
     context.fill();
     context.lineWidth = 2;
     context.strokeStyle = "#000";
     context.stroke();
-    label(context, name, x + 11, y, "left", 11);
+    if (names) label(context, name, x + 11, y, "left", 11);
   };
   if (knob) {
     line(center, flat(knob));
@@ -381,14 +391,4 @@ function handles(
     dot_(apex, "#ffe45c", "apex");
   }
   dot_(center, "#7dff9c", "centre");
-}
-
-/** Where the knob that turns the sides stands; null where the plane does not look along the axis. */
-export function rollKnob(scene: Scene, plane: Plane): Vec | null {
-  const edit = scene.edit.value;
-  const heart = scene.heart.value;
-  if (!edit || !heart) return null;
-  const axis = unit(sub(edit.apex, edit.base));
-  if (Math.abs(dot(axis, plane.normal)) < 0.9) return null;
-  return add(edit.center, scale(turned(scale(plane.down, -1), axis, (edit.roll * Math.PI) / 180), 48));
 }

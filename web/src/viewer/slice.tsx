@@ -2,20 +2,19 @@
 
 import { useEffect, useRef } from "preact/hooks";
 import { useCanvas } from "./canvas";
-import { type SliceStyle, drawSlice, rollKnob, sliceOrigin } from "./drawing";
+import { type SliceStyle, drawSlice, sliceOrigin } from "./drawing";
 import { handleEvents } from "./events";
+import { type Handle, dragged, handleAt } from "./handles";
 import { type Plane, letters, point } from "./plane";
 import { counts } from "../words";
 import type { Scene } from "./scene";
-import { type Vec, add, dot, norm, scale, sub, unit } from "./vector";
+import { type Vec, add, dot, scale } from "./vector";
 
 interface Props {
   scene: Scene;
   plane: Plane;
   onBig?: () => void;
 }
-
-type Handle = "base" | "apex" | "center" | "roll";
 
 export function Slice({ scene, plane, onBig }: Props) {
   const latest = useRef(plane);
@@ -114,7 +113,11 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
     element.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, event);
     if (pointers.size > 1) return;
-    handle = scene.tool.value === "correct" ? handleAt(scene, plane(), placeAt(event), 14 / factor()) : null;
+    const edit = scene.edit.value;
+    handle =
+      edit && scene.tool.value === "correct"
+        ? handleAt(edit, plane(), placeAt(event), 14 / factor(), scene.heart.value !== null)
+        : null;
     if (!handle && kind(event) === "cursor") scene.cursor.value = placeAt(event);
   };
   const kind = (event: PointerEvent) => {
@@ -133,7 +136,8 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
         zoom(span(before) / span(event));
         pan(dx / 2, dy / 2);
       }
-    } else if (handle) drag(scene, plane(), handle, placeAt(event));
+    } else if (handle)
+      scene.edit.value = scene.edit.value && dragged(scene.edit.value, plane(), handle, placeAt(event));
     else if (kind(event) === "window") window_(dx, dy);
     else if (kind(event) === "move") pan(dx, dy);
     else scene.cursor.value = placeAt(event);
@@ -186,65 +190,4 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
     keydown: press,
     contextmenu: quiet,
   });
-}
-
-/** The handle of the correction near a place, as seen in this plane. */
-function handleAt(scene: Scene, plane: Plane, place: Vec, reach: number): Handle | null {
-  const edit = scene.edit.value;
-  if (!edit) return null;
-  const flat = (v: Vec) => Math.hypot(dot(sub(v, place), plane.right), dot(sub(v, place), plane.down));
-  const candidates: [Handle, Vec][] = [
-    ["apex", edit.apex],
-    ["base", edit.base],
-    ["center", edit.center],
-  ];
-  const knob = rollKnob(scene, plane);
-  if (knob) candidates.unshift(["roll", knob]);
-  const near = candidates
-    .map(([name, at]): [Handle, number] => [name, flat(at)])
-    .filter(([, distance]) => distance < reach);
-  return near.sort((a, b) => a[1] - b[1])[0]?.[0] ?? null;
-}
-
-/** The cosine of the angle at which an axis counts as another one: 3 degrees. */
-const TILTED = 0.9986;
-
-function drag(scene: Scene, plane: Plane, handle: Handle, place: Vec): void {
-  const edit = scene.edit.value;
-  if (!edit) return;
-  const inPlane = (from: Vec) => {
-    const way = sub(place, from);
-    return add(from, add(scale(plane.right, dot(way, plane.right)), scale(plane.down, dot(way, plane.down))));
-  };
-  const next = { ...edit, changed: new Set(edit.changed) };
-  if (handle === "center") {
-    const to = inPlane(edit.center);
-    const way = sub(to, edit.center);
-    Object.assign(next, { center: to, base: add(edit.base, way), apex: add(edit.apex, way) });
-    next.changed.add("center");
-  } else if (handle === "roll") {
-    const axis = unit(sub(edit.apex, edit.base));
-    const way = sub(inPlane(edit.center), edit.center);
-    const top = scale(plane.down, -1);
-    const side = [
-      axis[1] * top[2] - axis[2] * top[1],
-      axis[2] * top[0] - axis[0] * top[2],
-      axis[0] * top[1] - axis[1] * top[0],
-    ] as Vec;
-    next.roll = Math.round((Math.atan2(dot(way, side), dot(way, top)) * 180) / Math.PI);
-    next.changed.add("roll");
-  } else {
-    const to = inPlane(edit[handle]);
-    const other = handle === "apex" ? edit.base : edit.apex;
-    if (norm(sub(to, other)) < 20) return;
-    next[handle] = to;
-    const [base, apex] = handle === "apex" ? [other, to] : [to, other];
-    if (handle === "base") next.changed.add("base");
-    // Along the axis, the base is only put elsewhere; aside, the axis is tilted with it.
-    if (handle === "apex" || dot(unit(sub(apex, base)), unit(sub(edit.apex, edit.base))) < TILTED) {
-      next.center = [0, 1, 2].map(n => base[n]! + 0.45 * (apex[n]! - base[n]!)) as unknown as Vec;
-      next.changed.add("axis").add("center");
-    }
-  }
-  scene.edit.value = next;
 }
