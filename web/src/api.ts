@@ -11,6 +11,8 @@ import type {
   Model,
   ModelSummary,
   Problem,
+  Reading,
+  ReadingSummary,
   Segmentation,
   SegmentationSummary,
   Serial,
@@ -23,19 +25,21 @@ export type { JobState, Normals, Problem, Volume } from "./generated/openapi";
 export type FileOfResult = Download;
 /** Kinds of work on scans. */
 export type Kind = "model" | "segmentation" | "beat" | "comparison" | "serial";
-export type Job = AnyJob & { kind: Kind | "normals" };
+export type Job = AnyJob & { kind: Kind | "normals" | "reading" };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;
 
-/** A model, a segmentation, a beat, a comparison, a serial comparison or a template; which of them, its id says. */
+/** A model, a segmentation, a beat, a comparison, a serial comparison, a reading or a template; which, its id says. */
 export type Result = Pick<
-  Model | Segmentation | Beat | Comparison | Serial,
+  Model | Segmentation | Beat | Comparison | Serial | Reading,
   "id" | "created_at" | "volume" | "files"
 > & {
   parameters: Parameters;
-  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary & ComparisonSummary & SerialSummary>;
-  links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"] & Serial["links"]>;
+  summary: Partial<
+    ModelSummary & SegmentationSummary & BeatSummary & ComparisonSummary & SerialSummary & ReadingSummary
+  >;
+  links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"] & Serial["links"] & Reading["links"]>;
 };
 
 export class ProblemError extends Error {

@@ -1,9 +1,9 @@
 // One job: its state while it lasts, and why it failed.
 
 import { useState } from "preact/hooks";
-import { type Job, type Problem, sentences, words } from "./api";
+import { type Job, type Parameters, type Problem, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
-import { open, openComparison, openSerial } from "./route";
+import { open, openComparison, openResult, openSerial } from "./route";
 import { ordinal, stage } from "./words";
 
 const KINDS: Record<Job["kind"], string> = {
@@ -13,6 +13,7 @@ const KINDS: Record<Job["kind"], string> = {
   comparison: "Rest and stress",
   serial: "Over the years",
   normals: "Normal limits",
+  reading: "Reading",
 };
 
 /** What is wrong, and what to do. */
@@ -29,10 +30,12 @@ export function Trouble({ problem }: { problem: Problem | null | undefined }) {
 export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) => void) | undefined }) {
   const [problem, setProblem] = useState("");
   const what = KINDS[job.kind];
+  const read = job.parameters as unknown as Parameters;
   const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
   const change = () => {
     if (job.kind === "comparison") openComparison(job.id);
     else if (job.kind === "serial") openSerial(job.id);
+    else if (job.kind === "reading") openResult(job.volume ?? "", String(read["result"]));
     else if (onChange) onChange(job);
     else if (job.volume) open(job.volume, job.id);
   };

@@ -18,7 +18,7 @@ import {
 import { listed, readList, trouble, volumes } from "./scanlist";
 import { Watched } from "./state";
 import { tellTabs } from "./tabs";
-import { isBeat, isComparison, isFit, isSerial, newest } from "./words";
+import { isBeat, isComparison, isFit, isReading, isSerial, newest } from "./words";
 
 export { trouble, volumes };
 export const models = new Watched<Result[]>([]);
@@ -26,6 +26,7 @@ export const fits = new Watched<Result[]>([]);
 export const beats = new Watched<Result[]>([]);
 export const comparisons = new Watched<Result[]>([]);
 export const serials = new Watched<Result[]>([]);
+export const readings = new Watched<Result[]>([]);
 export const normals = new Watched<Normals[]>([]);
 export const templates = new Watched<Result[]>([]);
 export const jobs = new Watched<Job[]>([]);
@@ -42,17 +43,19 @@ export async function refresh(): Promise<void> {
     beats: beats.value,
     comparisons: comparisons.value,
     serials: serials.value,
+    readings: readings.value,
   };
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
-    const [, m, s, b, c, y, t, n] = await Promise.all([
+    const [, m, s, b, c, y, r, t, n] = await Promise.all([
       readList(),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
       page<Result>("beats", { limit: 100 }),
       page<Result>("comparisons", { limit: 100 }),
       page<Result>("serials", { limit: 100 }),
+      page<Result>("readings", { limit: 100 }),
       page<Result>("templates", { limit: 100 }),
       page<Normals>("normals", { limit: 100 }),
     ]);
@@ -62,9 +65,10 @@ export async function refresh(): Promise<void> {
     beats.value = renewed(known.beats, beats.value, b);
     comparisons.value = renewed(known.comparisons, comparisons.value, c);
     serials.value = renewed(known.serials, serials.value, y);
+    readings.value = renewed(known.readings, readings.value, r);
     templates.value = t.items;
     normals.value = n.items;
-    partial.value = Boolean(j.next || m.next || s.next || b.next || c.next || y.next);
+    partial.value = Boolean(j.next || m.next || s.next || b.next || c.next || y.next || r.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -123,15 +127,16 @@ const KINDS = [
   ["beats", beats],
   ["comparisons", comparisons],
   ["serials", serials],
+  ["readings", readings],
 ] as const;
 
 function kindOf(id: string): (typeof KINDS)[number] {
-  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : isSerial(id) ? 4 : 1];
+  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : isSerial(id) ? 4 : isReading(id) ? 5 : 1];
 }
 
 /** What a job made, once it has succeeded. */
 export function madeBy(job: Job): string | null {
-  return job.segmentation ?? job.model ?? job.beat ?? job.comparison ?? job.serial ?? null;
+  return job.segmentation ?? job.model ?? job.beat ?? job.comparison ?? job.serial ?? job.reading ?? null;
 }
 
 export function find(id: string): Result | undefined {
@@ -200,6 +205,17 @@ export function scansOf({ volume, parameters }: { volume?: string | null; parame
 /** The serial comparisons in which one of these scans takes part. */
 export function serialsOf(...volumes: string[]): Result[] {
   return serials.value.filter(made => scansOf(made).some(id => volumes.includes(id))).sort(newest);
+}
+
+/** The readings of a result, the newest first. */
+export function readingsOf(result: string): Result[] {
+  return readings.value.filter(reading => reading.summary.result === result).sort(newest);
+}
+
+/** Reads the newest readings again: somebody else may have signed. */
+export async function loadReadings(): Promise<void> {
+  const before = readings.value;
+  readings.value = renewed(before, readings.value, await page<Result>("readings", { limit: 100 }));
 }
 
 // Browsers open at most six connections to a host, so few jobs are followed by events; the list tells of the others.

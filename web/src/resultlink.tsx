@@ -2,13 +2,14 @@
 
 import type { Result } from "./api";
 import { newerCorrections } from "./corrections";
+import { ReadMark } from "./readmark";
 import { nameAmong, resultName } from "./resultnames";
 import { isBeat, isComparison, isFit, isSerial, number } from "./words";
 
 export function ComparisonLink({ made }: { made: Result }) {
   return (
     <a class="result" href={`#/comparison/${made.id}`}>
-      <b>{resultName(made)}</b> {figures(made)}
+      <b>{resultName(made)}</b> <ReadMark of={made.id} /> {figures(made)}
       {newerCorrections(made).length > 0 && <span class="quiet"> older than a correction</span>}
     </a>
   );
@@ -26,7 +27,7 @@ export function SerialLink({ made }: { made: Result }) {
 export function ResultLink({ result, among }: { result: Result; among: Result[] }) {
   return (
     <a class="result" href={`#/scan/${result.volume}/${result.id}`}>
-      <b>{nameAmong(result, among)}</b> {figures(result)}
+      <b>{nameAmong(result, among)}</b> <ReadMark of={result.id} /> {figures(result)}
     </a>
   );
 }

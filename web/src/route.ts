@@ -4,6 +4,7 @@
 // rest and stress with that id, or the job that makes it, #/serial/ID a serial comparison likewise.
 
 import { Watched } from "./state";
+import { isComparison } from "./words";
 
 export interface Route {
   view: "list" | "scan" | "evaluation" | "limits" | "glossary" | "comparison" | "serial";
@@ -36,6 +37,12 @@ export function openComparison(id: string): void {
 /** Shows a serial comparison, or the job that makes it. */
 export function openSerial(id: string): void {
   location.hash = `#/serial/${id}`;
+}
+
+/** Shows a result of a scan: a comparison in its own view. */
+export function openResult(volume: string, id: string): void {
+  if (isComparison(id)) openComparison(id);
+  else open(volume, id);
 }
 
 /** Whether this scan is what the address names: the views follow a change of it a moment later. */

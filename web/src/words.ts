@@ -168,6 +168,10 @@ export function isSerial(id: string): boolean {
   return id.startsWith("ser_");
 }
 
+export function isReading(id: string): boolean {
+  return id.startsWith("rdg_");
+}
+
 /** The kind of work that makes such a result. */
 export function kindOf(id: string): Kind {
   if (isSerial(id)) return "serial";

@@ -1,6 +1,7 @@
 // Filing work: what a person asks for becomes a job, whose state the library follows.
 
 import { type Job, type Kind, type ParameterValue, type Volume, post } from "./api";
+import type { ReadingRequest } from "./generated/openapi";
 import { put, watchActive } from "./library";
 import { tellTabs } from "./tabs";
 import { storedNameOf } from "./words";
@@ -47,6 +48,10 @@ export async function fileSerial({ scans, normals, parameters }: Series): Promis
   const labels = last ? { name: storedNameOf(last).slice(0, 200) } : {};
   const order = { scans: scans.map(scan => scan.id), parameters, labels, ...(normals ? { normals } : {}) };
   return follow(await post<Job>("/v1/serials", order));
+}
+
+export async function fileReading(order: Partial<ReadingRequest>): Promise<Job> {
+  return follow(await post<Job>("/v1/readings", order));
 }
 
 export async function file(

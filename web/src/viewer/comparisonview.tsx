@@ -39,6 +39,8 @@ import { Downloads, Takeaways } from "./figures";
 import { HeartWall } from "./heartwall";
 import { useMedia } from "./media";
 import { lutOf } from "./mapsrow";
+import { readableComparison } from "./readable";
+import { ReadingPanel } from "./readingpanel";
 import { screenshot } from "./screenshot";
 import { printsAs } from "./sheetparts";
 import { ColourBar, byMap, coloursOf } from "./wall";
@@ -122,6 +124,7 @@ const WIDE = "(min-width: 1700px)";
 function Comparison({ compared, scans }: ComparisonProps) {
   const wide = useMedia(WIDE);
   const scene = useMemo(() => new ComparedScene(), [compared]);
+  const readable = useMemo(() => readableComparison(compared), [compared]);
   useEffect(
     () => printsAs(() => <ComparisonSheet compared={compared} scene={scene} scans={scans} />),
     [compared, scene, scans],
@@ -138,6 +141,7 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <BothMeasures report={compared.report} />
         <SimulatedNote report={compared.report} />
         {!areNotComparable(compared.report) && <Reasons report={compared.report} />}
+        <ReadingPanel readable={readable} volume={scans.stress} />
         <Particulars compared={compared} scene={scene} />
         <Downloads result={compared.result} volume={scans.stress} />
         <Others compared={compared} />

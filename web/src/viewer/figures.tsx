@@ -190,6 +190,27 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
   );
 }
 
+interface PageProps {
+  path: string;
+  /** The name that it is saved under, where the page has a key, which a link cannot carry. */
+  name: string;
+  children: string;
+  failed: (error: unknown) => void;
+}
+
+/** A button for an HTML page of the service. */
+export function PageButton({ path, name, children, failed }: PageProps) {
+  return key.value ? (
+    <button type="button" onClick={() => void save(path, name).catch(failed)}>
+      {children}
+    </button>
+  ) : (
+    <a class="button" href={at(path)} target="_blank" rel="noopener">
+      {children}
+    </a>
+  );
+}
+
 /** What is taken away most often, which stands first. */
 export function Takeaways({
   result,
@@ -207,16 +228,11 @@ export function Takeaways({
   return (
     <section class="downloads takeaways" aria-label="Report and print">
       <div class="buttons">
-        {page &&
-          (key.value ? (
-            <button type="button" onClick={() => void save(page, `${fileNameOf(volume)}_report.html`).catch(failed)}>
-              Report
-            </button>
-          ) : (
-            <a class="button" href={at(page)} target="_blank" rel="noopener">
-              Report
-            </a>
-          ))}
+        {page && (
+          <PageButton path={page} name={`${fileNameOf(volume)}_report.html`} failed={failed}>
+            Report
+          </PageButton>
+        )}
         {prints && (
           <button type="button" onClick={() => print()}>
             Print

@@ -23,6 +23,7 @@ import {
 } from "../library";
 import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
+import { ReadMark } from "../readmark";
 import { nameAmong, resultName, timeOf } from "../resultnames";
 import { home, isAt, open, openComparison, openSerial, route } from "../route";
 import { useWatched } from "../state";
@@ -36,6 +37,8 @@ import { type Loaded, loadLoaded, readGates, voxelsOf } from "./loaded";
 import { Pictures } from "./pictures";
 import { Player } from "./player";
 import { PolarView } from "./polarview";
+import { readableScan } from "./readable";
+import { ReadingPanel } from "./readingpanel";
 import { Scene } from "./scene";
 import { sheetOf } from "./sheet";
 import { type Printed, printsAs } from "./sheetparts";
@@ -103,7 +106,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       }
       if (!running.current.delete(job.id) || job.state !== "succeeded") continue;
       const made = madeBy(job);
-      if (!made || !isAt(volume.id) || (scene?.edit.value && !isFiledHere(job))) continue;
+      if (!made || job.kind === "reading" || !isAt(volume.id) || (scene?.edit.value && !isFiledHere(job))) continue;
       if (job.kind === "comparison") openComparison(made);
       else if (job.kind === "serial") openSerial(made);
       else open(volume.id, made, job.labels["parent"] ?? null);
@@ -269,9 +272,10 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   const [draft, setDraft] = useState<Draft>({});
   const [problem, setProblem] = useState<{ field: string | null; text: string } | null>(null);
   const [sending, setSending] = useState(false);
+  const readable = useMemo(() => shown && readableScan(shown), [shown]);
 
   const repeat = ({ kind, parameters }: Pick<Job, "kind" | "parameters">) => {
-    if (kind === "normals" || kind === "comparison" || kind === "serial") return;
+    if (kind === "normals" || kind === "comparison" || kind === "serial" || kind === "reading") return;
     setKind(kind);
     setTab("work");
     void parameterSpecs().then(specs => setDraft(draftOf(parameters as Parameters, specs[kind])));
@@ -336,7 +340,9 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
                 aria-pressed={result.id === current}
                 onClick={() => open(volume.id, result.id, otherId === result.id ? null : otherId)}>
                 <b>{resultName(result)}</b>
-                <span class="quiet">{timeOf(result, results)}</span>
+                <span class="quiet">
+                  {timeOf(result, results)} <ReadMark of={result.id} />
+                </span>
                 <Origin result={result} jobs={own} results={results} />
               </button>
               {current && result.id !== current && (
@@ -368,6 +374,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
             <JobLine key={job.id} job={job} onChange={repeat} />
           ))}
       </section>
+      {readable && <ReadingPanel key={readable.result.id} readable={readable} volume={volume} />}
       <div class="tabs" role="group" aria-label="What to do">
         <button
           type="button"
@@ -435,7 +442,7 @@ function Comparisons({ volume }: { volume: string }) {
     <>
       {comparisonsOf(volume).map(made => (
         <a key={made.id} class="result" href={`#/comparison/${made.id}`}>
-          <b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span>
+          <b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span> <ReadMark of={made.id} />
         </a>
       ))}
       {serialsOf(volume).map(made => (
