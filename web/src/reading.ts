@@ -8,8 +8,8 @@ import { moment } from "./words";
 import { fileReading } from "./work";
 
 export const SEGMENTS = 17;
-/** Most letters of a text. */
-export const MOST_LETTERS = 4000;
+/** Most letters of the texts. */
+export const MOST_LETTERS = { impression: 4000, limits: 1000 };
 
 /** Where scores stand: `scan` where there is one scan. */
 export type ScoredScan = "stress" | "rest" | "scan";
@@ -134,7 +134,7 @@ export function personName(name: string): string {
 
 /** Who read, and when. */
 export function readBy({ summary }: Result): string {
-  return `Read by ${personName(summary.reader ?? "")}, ${moment(summary.read_at ?? "")}`;
+  return `Read by ${personName(summary.reader ?? "")} on ${moment(summary.read_at ?? "")}`;
 }
 
 /** The sentence that is a line of the text, or the text with it. */

@@ -15,6 +15,7 @@ import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
 import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
+import { readings } from "./reading.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 import { serials } from "./serial.mjs";
 import { start } from "./service.mjs";
@@ -630,6 +631,7 @@ async function main() {
   await comparisons(tools);
   await studies(tools);
   await serials(tools);
+  await readings(tools);
 
   await check("the documentation of the API", async () => {
     for (const [width, dark] of [

@@ -40,7 +40,7 @@ import { HeartWall } from "./heartwall";
 import { useMedia } from "./media";
 import { lutOf } from "./mapsrow";
 import { readableComparison } from "./readable";
-import { ReadingPanel } from "./readingpanel";
+import { ReadingPanel, ReadingState } from "./readingpanel";
 import { screenshot } from "./screenshot";
 import { printsAs } from "./sheetparts";
 import { ColourBar, byMap, coloursOf } from "./wall";
@@ -135,6 +135,7 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <Head compared={compared} scans={scans} scene={scene} />
         <ComparedCorrection compared={compared} scene={scene} scans={scans} />
         <Takeaways result={compared.result} volume={scans.stress} />
+        <ReadingState of={compared.result.id} />
         <Outdated made={compared.result} />
         {areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Headlines report={compared.report} />

@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import { type Job, type Result, fieldOf, sentences, words } from "../api";
 import { Confirm } from "../confirm";
-import { jobs, loadReadings, loadResult } from "../library";
+import { isActive, jobs, loadReadings, loadResult } from "../library";
 import {
   MOST_LETTERS,
   type Quality,
@@ -44,7 +44,7 @@ export function ReadingForm({ readable, draft, newest, job, onClose }: Props) {
   const change = (part: Partial<ReadingDraft>) =>
     keepDraft(result.id, { ...draft, job: null, isChanged: true, ...part });
   const isReadMeanwhile = newest !== undefined && newest.id !== draft.amends;
-  const isUnderWay = isSending || (draft.job !== null && job?.state !== "failed" && job?.state !== "cancelled");
+  const isUnderWay = isSending || (job !== undefined && (isActive(job) || job.state === "succeeded"));
   const failure = job?.error ? { field: fieldIn(job.error.field), text: sentences(job.error).join(" ").trim() } : null;
   const told = problem ?? failure;
   const error = (field: string) =>
@@ -120,6 +120,7 @@ export function ReadingForm({ readable, draft, newest, job, onClose }: Props) {
         <span>Limits</span>
         <input
           value={draft.limits}
+          maxLength={MOST_LETTERS.limits}
           autocomplete="off"
           {...wrong("limits")}
           onInput={event => change({ limits: event.currentTarget.value })}
@@ -135,7 +136,7 @@ export function ReadingForm({ readable, draft, newest, job, onClose }: Props) {
         <span>Impression</span>
         <textarea
           rows={Math.min(12, Math.max(5, 2 * draft.impression.split("\n").length))}
-          maxLength={MOST_LETTERS}
+          maxLength={MOST_LETTERS.impression}
           value={draft.impression}
           {...wrong("impression")}
           onInput={event => change({ impression: event.currentTarget.value })}

@@ -1,12 +1,33 @@
 // The reading of a result: whether it was read, by whom, and what somebody states who reads or amends it.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { type Volume, words } from "../api";
-import { jobs, loadReadings, readings, readingsOf } from "../library";
-import { type Readable, draftFrom, drafts, firstDraft, keepDraft } from "../reading";
+import { find, jobs, loadReadings, readings, readingsOf } from "../library";
+import { type Readable, draftFrom, drafts, firstDraft, keepDraft, readBy } from "../reading";
 import { useWatched } from "../state";
 import { ReadingForm } from "./readingform";
 import { FormerReadings, SignedReading } from "./signed";
+
+const HEAD = ".reading h2";
+
+/** Whether the result was read, where its view begins, and the way to the panel. */
+export function ReadingState({ of }: { of: string }) {
+  useWatched(readings);
+  const [newest] = readingsOf(of);
+  const show = () => {
+    const head = document.querySelector<HTMLElement>(HEAD);
+    head?.scrollIntoView();
+    head?.focus({ preventScroll: true });
+  };
+  return (
+    <p class="reading-state">
+      <span>{newest ? readBy(newest) : "Not read yet"}</span>
+      <button type="button" class="plain" onClick={show}>
+        Reading
+      </button>
+    </p>
+  );
+}
 
 export function ReadingPanel({ readable, volume }: { readable: Readable; volume: Volume }) {
   const { id } = readable.result;
@@ -19,12 +40,20 @@ export function ReadingPanel({ readable, volume }: { readable: Readable; volume:
   useEffect(() => void loadReadings().catch(error => setProblem(words(error))), [id]);
 
   // What is signed is no draft any more, once the reading is there.
-  const isSigned = job?.state === "succeeded" && newest?.id === job.reading;
+  const isSigned = job?.state === "succeeded" && job.reading != null && find(job.reading) !== undefined;
   useEffect(() => {
     if (!isSigned) return;
     keepDraft(id, null);
     setOpen(false);
   }, [isSigned]);
+
+  // The button that was pressed is gone.
+  const head = useRef<HTMLHeadingElement>(null);
+  const wasOpen = useRef(isOpen);
+  useLayoutEffect(() => {
+    if (wasOpen.current !== isOpen) head.current?.focus();
+    wasOpen.current = isOpen;
+  }, [isOpen]);
 
   const begin = async () => {
     setProblem("");
@@ -34,7 +63,9 @@ export function ReadingPanel({ readable, volume }: { readable: Readable; volume:
   const close = () => setOpen(false);
   return (
     <section class="reading" aria-label="Reading">
-      <h2>Reading</h2>
+      <h2 tabIndex={-1} ref={head}>
+        Reading
+      </h2>
       {newest ? <SignedReading reading={newest} volume={volume} /> : !isOpen && <p class="quiet">Not read yet.</p>}
       {!isOpen && (
         <div class="buttons">

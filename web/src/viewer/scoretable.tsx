@@ -37,14 +37,16 @@ export function ScoreTable({ scans, segments, scores, onScore }: Props) {
       <thead>
         <tr>
           <th scope="col">Segment</th>
-          {scans.map(({ scan }) => [
+          {scans.map(({ scan, automatic }) => [
             <th key={scan} scope="col">
               {HEADS[scan]}
             </th>,
-            <th key={`${scan} automatic`} scope="col" class="quiet">
-              <span aria-hidden="true">auto</span>
-              <span class="hidden">{HEADS[scan]}, automatic</span>
-            </th>,
+            automatic && (
+              <th key={`${scan} automatic`} scope="col" class="quiet">
+                <span aria-hidden="true">auto</span>
+                <span class="hidden">{HEADS[scan]}, automatic</span>
+              </th>
+            ),
           ])}
           {both && <th scope="col">Diff.</th>}
         </tr>
@@ -66,9 +68,11 @@ export function ScoreTable({ scans, segments, scores, onScore }: Props) {
                   go={go}
                 />
               </td>,
-              <td key={`${scan} automatic`} class="quiet">
-                {automatic?.[row] ?? "–"}
-              </td>,
+              automatic && (
+                <td key={`${scan} automatic`} class="quiet">
+                  {automatic[row] ?? "–"}
+                </td>
+              ),
             ])}
             {both && <td>{exceeds(readAt("stress", row), readAt("rest", row))}</td>}
           </tr>
@@ -84,9 +88,11 @@ export function ScoreTable({ scans, segments, scores, onScore }: Props) {
             <td key={scan}>
               <output>{sumOf(scores[scan])}</output>
             </td>,
-            <td key={`${scan} automatic`} class="quiet">
-              {sumOf(automatic) ?? "–"}
-            </td>,
+            automatic && (
+              <td key={`${scan} automatic`} class="quiet">
+                {sumOf(automatic)}
+              </td>
+            ),
           ])}
           {both && (
             <td>
