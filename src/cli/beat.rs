@@ -32,7 +32,8 @@ polar_thickening,
 polar_phase), mesh.glb (the beat as an animation), mesh_ed.glb and mesh_es.glb (end diastole and end systole),
 mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes and triangles) and \
 labels_gate01.nii.gz, ...
-(wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
+(wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm, measurements.dcm
+and fhir.json (the same as FHIR R4).
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {
     /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, ordered by DICOM headers, else by the

@@ -32,8 +32,8 @@ polar maps
 each scan the
 fitted wall (mesh_stress.glb, mesh_rest.glb, ...) and the image about the heart (region_stress.nii.gz, \
 region_rest.nii.gz); slices.png
-(stress above rest), report.html and, with --dicom, measurements.dcm, page.dcm (the report as
-one picture), polar_stress.dcm, polar_rest.dcm and polar_difference.dcm.
+(stress above rest), report.html and, with --dicom, measurements.dcm, fhir.json
+(the same as FHIR R4), page.dcm (the report as one picture), polar_stress.dcm, polar_rest.dcm and polar_difference.dcm.
 One scan given twice and scans of two patients are refused.")]
 pub struct CompareArgs {
     /// The scan at stress: a file, or all files of it

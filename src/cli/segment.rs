@@ -37,7 +37,7 @@ report.html, slices.png, region.nii.gz (the scan about the organ, which the repo
 left ventricle, polar.json, polar.svg, polar.png, and mask and mesh of the anatomical wall: mask_anatomical.nii.gz, \
 mesh_anatomical.glb, ... (with --edge anatomical:
 mask_apparent.nii.gz, mesh_apparent.glb, ...); with --dicom also mask.dcm, contours.dcm, mesh.dcm,
-surface.dcm, measurements.dcm, polar.dcm and page.dcm (the report as one picture).
+surface.dcm, measurements.dcm, fhir.json (the same as FHIR R4), polar.dcm and page.dcm (the report as one picture).
 Of raw projections also projections.png (views, sinogram, linogram)")]
 pub struct SegmentArgs {
     /// The volume: NIfTI (.nii, .nii.gz, or a .hdr and .img pair) or DICOM (a multi-frame NM, PET, CT or

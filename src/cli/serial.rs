@@ -35,7 +35,8 @@ Writes serial.json (figures of every scan; of every pair the change of each figu
 changed, and the
 least change that would show), figures.csv, changes.csv, segments.csv, trend.svg, report.html; of every scan \
 polar_scan01, mesh_scan01
-and region_scan01.nii.gz; of every pair polar_change_01_02; with --dicom measurements.dcm.
+and region_scan01.nii.gz; of every pair polar_change_01_02; with --dicom measurements.dcm
+and fhir.json (the same as FHIR R4).
 One scan given twice, scans of two patients, and rest beside stress are refused.")]
 pub struct SerialArgs {
     /// The scans, 2 to 20: each a file, or a folder with all files of one scan

@@ -94,6 +94,7 @@ async fn a_scope_allows_what_it_says_and_no_more() {
     let app = TestApp::start().await;
     let read = plain_key(&app, Scope::Read).await;
     let submit = plain_key(&app, Scope::Submit).await;
+    let sign = plain_key(&app, Scope::Sign).await;
     let admin = plain_key(&app, Scope::Admin).await;
     closed(&app).await;
     for (method, path, operation) in operations() {
@@ -109,9 +110,11 @@ async fn a_scope_allows_what_it_says_and_no_more() {
             || method == Method::DELETE && path == "/v1/volumes";
         // They name patients.
         let for_submitters = begins(&["/dicom-web/workitems"]) || path.ends_with("/identity");
+        let for_signers = begins(&["/v1/readings"]) && !method.is_safe();
         let refused = [
             (&read, for_admins || for_submitters || !method.is_safe()),
-            (&submit, for_admins),
+            (&submit, for_admins || for_signers),
+            (&sign, for_admins),
             (&admin, false),
         ];
         for (key, refused) in refused {
