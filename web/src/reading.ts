@@ -3,6 +3,7 @@
 import type { Job, Result } from "./api";
 import { get } from "./api";
 import type { ReadingReport, ReadingRequest } from "./generated/openapi";
+import { find, jobs, readings } from "./library";
 import { Watched } from "./state";
 import { moment } from "./words";
 import { fileReading } from "./work";
@@ -65,6 +66,15 @@ export function keepDraft(result: string, draft: ReadingDraft | null): void {
   else next.delete(result);
   drafts.value = next;
 }
+
+// What is signed is no draft any more once its reading is there, also if its panel is not shown.
+function dropSigned(): void {
+  for (const [result, { job: id }] of drafts.value) {
+    const job = id && jobs.value.find(one => one.id === id);
+    if (job && job.state === "succeeded" && job.reading && find(job.reading)) keepDraft(result, null);
+  }
+}
+for (const list of [jobs, readings, drafts]) list.watch(dropSigned);
 
 const zeros = (): number[] => new Array<number>(SEGMENTS).fill(0);
 

@@ -2,7 +2,7 @@
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { type Volume, words } from "../api";
-import { find, jobs, loadReadings, readings, readingsOf } from "../library";
+import { jobs, loadReadings, readings, readingsOf } from "../library";
 import { type Readable, draftFrom, drafts, firstDraft, keepDraft, readBy } from "../reading";
 import { useWatched } from "../state";
 import { ReadingForm } from "./readingform";
@@ -39,13 +39,10 @@ export function ReadingPanel({ readable, volume }: { readable: Readable; volume:
   const job = useWatched(jobs).find(one => one.id === draft?.job);
   useEffect(() => void loadReadings().catch(error => setProblem(words(error))), [id]);
 
-  // What is signed is no draft any more, once the reading is there.
-  const isSigned = job?.state === "succeeded" && job.reading != null && find(job.reading) !== undefined;
+  const isGone = draft === undefined;
   useEffect(() => {
-    if (!isSigned) return;
-    keepDraft(id, null);
-    setOpen(false);
-  }, [isSigned]);
+    if (isGone) setOpen(false);
+  }, [isGone]);
 
   // The button that was pressed is gone.
   const head = useRef<HTMLHeadingElement>(null);
