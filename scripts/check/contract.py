@@ -245,7 +245,7 @@ class Walk:
                 self.failures.append(f"{what}: {error}")
             if media_type == PROBLEM:
                 self.recorded["problems"].setdefault(status, value)
-            elif media_type in ("application/json", "application/dicom+json"):
+            elif media_type in ("application/json", "application/dicom+json", "application/fhir+json"):
                 self.record(name, status, media_type, schema, short(value) if cut else value)
             return answer, value
         elif media_type == "text/plain":
@@ -397,17 +397,16 @@ def readings(walk, results):
     return read
 
 
-# The files that a reading has only of one kind of result.
+# The files that a reading of a beat does not have.
 READ_OF = {
     "report.json": "segmentations",
     "mask.nii.gz": "segmentations",
     "mesh.json": "segmentations",
-    "polar.svg": "segmentations",
-    "beat.json": "beats",
-    "curve.svg": "beats",
-    "polar_motion.svg": "beats",
-    "polar_thickening.svg": "beats",
-    "polar_phase.svg": "beats",
+    "comparison.json": "comparisons",
+    "slices.png": "comparisons",
+    "polar_stress.svg": "comparisons",
+    "polar_rest.svg": "comparisons",
+    "polar_difference.svg": "comparisons",
 }
 
 
@@ -578,7 +577,8 @@ def everything(walk, folder):
         "beats": beat,
         "comparisons": comparison,
         "serials": serial,
-        "readings": read["comparisons"],
+        # Examples show short lists, and 17 scores are one list.
+        "readings": read["beats"],
         "normals": normals,
         "templates": added["id"],
         "readers": reader["id"],
@@ -601,7 +601,7 @@ def everything(walk, folder):
                 elif name == "projections.png":
                     own = from_views
                 elif found[1] == "readings":
-                    own = read[READ_OF.get(name, "comparisons")]
+                    own = read[READ_OF.get(name, "beats")]
                 else:
                     own = made
                 call("get", template, expect=200, id=own, file=name.replace("NN_NN", "01_02").replace("NN", "01"))

@@ -1768,6 +1768,14 @@ export interface components {
             /** @description Why. */
             reason: string;
         };
+        FhirBundle: {
+            /** @description The DiagnosticReport first, then what it refers to */
+            entry: Record<string, never>[];
+            /** @enum {string} */
+            resourceType: "Bundle";
+        } & {
+            [key: string]: unknown;
+        };
         /** @description A figure beside its limits. */
         FigureBeside: {
             /** @description Its name in the limits, with its unit. */
@@ -2435,7 +2443,7 @@ export interface components {
             /** @description `cursor` of the next page; absent on the last. */
             next_cursor?: string | null;
         };
-        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["SerialParameters"] | components["schemas"]["NormalsParameters"];
+        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["SerialParameters"] | components["schemas"]["NormalsParameters"] | components["schemas"]["ReadingParameters"];
         JobRequest: components["schemas"]["ModelJobRequest"] | components["schemas"]["SegmentationJobRequest"] | components["schemas"]["BeatJobRequest"] | components["schemas"]["ComparisonJobRequest"] | components["schemas"]["SerialJobRequest"] | components["schemas"]["NormalsJobRequest"];
         /** @description A series in an archive. */
         JobSource: {
@@ -7069,6 +7077,7 @@ export type ErasurePlan = components['schemas']['ErasurePlan'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
 export type ExcludedCase = components['schemas']['ExcludedCase'];
+export type FhirBundle = components['schemas']['FhirBundle'];
 export type FigureBeside = components['schemas']['FigureBeside'];
 export type FigureChange = components['schemas']['FigureChange'];
 export type FigureSegment = components['schemas']['FigureSegment'];

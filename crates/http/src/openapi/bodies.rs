@@ -15,7 +15,7 @@ use utoipa::{PartialSchema, ToSchema};
 use ventriform::heart::normals::{NormalLimits, Sex};
 use ventriform::parameters::{
     CohortCase, ComparisonParameters, FitParameters, GatedParameters, ModelParameters,
-    NormalsParameters, SerialParameters,
+    NormalsParameters, ReadingParameters, SerialParameters,
 };
 use ventriform_service::base::records::Resource;
 use ventriform_service::work::dicom;
@@ -57,6 +57,7 @@ schemas! {
             add::<GatedParameters>,
             add::<ComparisonParameters>,
             add::<SerialParameters>,
+            add::<ReadingParameters>,
             add::<NormalsJobParameters>,
             add::<JobParameters>,
             add::<CohortCase>,
@@ -81,7 +82,8 @@ schemas! {
         let parameters = JOB_KINDS.iter().fold(AnyOfBuilder::new(), |parameters, kind| {
             parameters.item(Ref::from_schema_name((kind.parameters)()))
         });
-        parameters.build()
+        // Readings are signed at a path of their own.
+        parameters.item(Ref::from_schema_name(ReadingParameters::name())).build()
     };
     /// A comparison to be made.
     ComparisonRequest, |schemas| { JobRequest::schemas(schemas) } => {
@@ -131,6 +133,18 @@ schemas! {
             .examples([json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}])]);
         sets.build()
     };
+    /// A Bundle of FHIR R4.
+    FhirBundle => ObjectBuilder::new()
+        .property("resourceType", text().enum_values(Some(["Bundle"])))
+        .property(
+            "entry",
+            ArrayBuilder::new()
+                .description(Some("The DiagnosticReport first, then what it refers to"))
+                .items(Object::with_type(Type::Object)),
+        )
+        .required("resourceType")
+        .required("entry")
+        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(true)));
     /// A mesh, as in `mesh.json`.
     MeshDocument => {
         let triples = |kind: Type, description: &str| {

@@ -86,6 +86,7 @@ use utoipa::openapi::{RefOr, Required};
     ),
     components(schemas(
         crate::wire::problem::ProblemBody,
+        bodies::FhirBundle,
         bodies::MeshDocument,
         ventriform::results::report::ModelReport,
         ventriform::results::report::Closeness,

@@ -576,7 +576,7 @@ fn media_type_of(name: &str) -> &'static str {
 /// The schema of a product's file.
 fn schema_of(folder: &str, name: &str) -> Value {
     match (name, media_type_of(name)) {
-        (FHIR_FILE, _) => json!({"type": "object"}),
+        (FHIR_FILE, _) => reference("FhirBundle"),
         ("reading.json", _) => reference("ReadingReport"),
         // A reading keeps the report of what was read.
         ("report.json", _) if folder.contains("readings") => reference("SegmentationReport"),

@@ -83,7 +83,11 @@ fn a_heart_that_looks_alike_from_all_sides_is_not_turned() {
     let turned = made.scans[1].registration.motion.degrees();
     assert!(turned < 25.0, "{turned}");
     let report = made.report();
-    let volumes: Vec<f64> = report.scans.iter().filter_map(|scan| scan.cavity_ml).collect();
+    let volumes: Vec<f64> = report
+        .scans
+        .iter()
+        .filter_map(|scan| scan.cavity_ml)
+        .collect();
     assert!((volumes[0] / volumes[1] - 1.0).abs() < 0.1, "{volumes:?}");
 }
 
