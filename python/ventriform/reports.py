@@ -123,6 +123,8 @@ class BeatReport(Document):
     """Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat."""
     gates: list[GateReport]
     """Each gate, in the mean over its width."""
+    impression: list[str] | None = None
+    """Sentences that a reader may take over into the impression; `null` where the report was made before they existed."""
     input: FileFacts
     """The file of the gates."""
     long_axis: LongAxis | None = None
@@ -304,6 +306,8 @@ class ComparisonReport(Document):
     """Whether there is such wall."""
     flags: list[Flag]
     """Reasons to look closer."""
+    impression: list[str] | None = None
+    """Sentences that a reader may take over into the impression; `null` where the report was made before they existed."""
     lost_percent: float | None = None
     """What stress lacks in the regions that lose uptake, per cent of the whole wall's uptake at rest."""
     matched_percent: float
@@ -933,6 +937,8 @@ class Job(Document):
     """The share of the work that is done."""
     queue_position: int | None = None
     """Place in the queue; the next job to start has 1. Only while it waits."""
+    reading: str | None = None
+    """The reading it wrote; only for kind `reading`."""
     revision: int
     """Grows with every change; also the id of the events."""
     segmentation: str | None = None
@@ -971,6 +977,8 @@ class JobLinks(Document):
     """The model it made."""
     normals: str | None = None
     """The normal limits it built."""
+    reading: str | None = None
+    """The reading it wrote."""
     report: str | None = None
     """The report on what it made."""
     segmentation: str | None = None
@@ -1816,6 +1824,8 @@ class SegmentationReport(Document):
     """Figures of the fit."""
     flags: list[Flag]
     """Reasons to look closer."""
+    impression: list[str] | None = None
+    """Sentences that a reader may take over into the impression; `null` where the report was made before they existed."""
     input: FileFacts
     """The volume's file."""
     localisation: Localisation | None = None
