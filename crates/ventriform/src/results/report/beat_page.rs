@@ -2,7 +2,7 @@
 
 use super::beat_report::BeatReport;
 use super::page_parts::{
-    flags_headline, limits_hint, normal_limits, offered_impression, polar_maps, short, volume_line,
+    flags_headline, limits_hint, normal_limits, polar_maps, short, volume_line,
 };
 use super::sections::Program;
 use super::summaries::object;
@@ -67,7 +67,6 @@ pub fn beat_page(page: &BeatPage) -> String {
             (whose::section(page.scan))
             (verdict(report))
             (figures(report))
-            (offered_impression(report.impression.as_deref()))
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             (curves(page))

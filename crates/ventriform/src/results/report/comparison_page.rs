@@ -1,7 +1,7 @@
 //! The page of a comparison: flags, figures, slices, polar maps side by side, territories and segments, both scans.
 
 use super::comparison_report::{ComparedScan, ComparisonReport};
-use super::page_parts::{flags_headline, offered_impression, polar_maps, short};
+use super::page_parts::{flags_headline, polar_maps, short};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -67,7 +67,6 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
             (whose::section(page.scan))
             (document::verdict(sign, &headline, &checks(report)))
             (figures(report))
-            (offered_impression(report.impression.as_deref()))
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", warnings.map(String::as_str)))
             (slices(page))

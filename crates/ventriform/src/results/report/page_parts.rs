@@ -61,15 +61,6 @@ pub(super) fn polar_maps(
     }
 }
 
-/// The sentences that are offered for the impression.
-pub(super) fn offered_impression(sentences: Option<&[String]>) -> Markup {
-    let sentences = sentences.unwrap_or_default();
-    document::notes(
-        "Offered for the impression",
-        sentences.iter().map(String::as_str),
-    )
-}
-
 /// For the hint at maps of uptake: whether normal limits stand beside them.
 pub(super) fn limits_hint(perfusion: Option<&PerfusionReport>) -> &'static str {
     match perfusion {

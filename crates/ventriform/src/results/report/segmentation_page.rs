@@ -1,9 +1,7 @@
 //! The page of a segmentation: flags, figures, slices, polar map, agreement, the fitted model.
 
 use super::embedded::Embedded;
-use super::page_parts::{
-    flags_headline, limits_hint, normal_limits, offered_impression, short, volume_line,
-};
+use super::page_parts::{flags_headline, limits_hint, normal_limits, short, volume_line};
 use super::projections_report::{MoveReport, ProjectionsReport, UncorrectedReport, ViewReport};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
@@ -57,7 +55,6 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
             (whose::section(page.scan))
             (verdict(report))
             (figures(report))
-            (offered_impression(report.impression.as_deref()))
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             @if let Some(png) = page.slices { (slices(report, png, page.region.is_some())) }
