@@ -416,7 +416,8 @@ export async function comparisons(tools) {
         await look(page, "comparison-cine-no-beats");
         await page.getByRole("button", { name: "Fit the beats" }).click();
       }
-      await page.waitForSelector(".compared-beat .beat-chart");
+      // Two beats are fitted, which takes minutes beside other work.
+      await page.waitForSelector(".compared-beat .beat-chart", { timeout: 600_000 });
       await page.waitForFunction(
         () => !/the wall in the sum/.test(document.querySelector(".compared-stage").textContent),
       );
