@@ -2,23 +2,20 @@
 
 use crate::app::App;
 use crate::edge::caller::Caller;
-use crate::edge::quota::reserve_job;
 use crate::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use crate::resources::files;
 use crate::resources::jobs::PriorityQuery;
-use crate::resources::jobs::filing::{self, UploadJob};
+use crate::resources::jobs::filing::{self, JsonOrder, UploadJob};
 use crate::resources::named_scan::{NamedScan, SCAN_ID_FIX, add, named_scan};
-use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
+use crate::resources::products::{Offer, ProductCollection, body_of_product, object_paths};
 use crate::resources::tags::TagQuery;
-use crate::wire::fields::FieldReader;
-use crate::wire::job_fields::{ComparisonFields, OrderFields, SendFields};
+use crate::wire::job_fields::ComparisonFields;
 use crate::wire::limits::BodyLimits;
 use crate::wire::links::path_of;
-use crate::wire::negotiate::preferred_wait;
 use crate::wire::problem::{Answer, Problem, shorten};
 use crate::wire::query::QueryReader;
 use crate::wire::request::media_type;
-use crate::wire::webhook_request::{WebhookQuery, job_webhook};
+use crate::wire::webhook_request::WebhookQuery;
 use axum::extract::{Request, State};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -138,19 +135,10 @@ pub async fn create_comparison(
     let settings = app.service.settings();
     let limits = BodyLimits::of_json(settings, settings.json_limit);
     request.extensions_mut().insert(limits);
-    let headers = request.headers().clone();
-    let counting = reserve_job(&app, &caller, &headers).await?;
-    let patience = preferred_wait(&headers);
-    if patience.is_some() {
-        products::choose(&headers, &offers())?;
-    }
-    let trace_parent = crate::edge::observe::trace_parent(&request);
-    let mut body = FieldReader::read(&app, request).await?;
-    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let read = JsonOrder::read(&app, &caller, Resource::Comparison, offers(), request);
+    let (order, body) = read.await?;
     let scans: ComparisonFields = body.all()?;
-    let work = app.service.work_of(Resource::Comparison.noun())?;
-    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
-    order.send = send.order(&app, &order.tenant, Resource::Comparison.noun(), None)?;
+    let order = order.checked()?;
     let tenant = &caller.tenant;
     let (stress, of_stress) = scan_of(&app, tenant, scans.stress, WhichScan::Stress).await?;
     let mut parameters = scans.parameters;
@@ -162,16 +150,9 @@ pub async fn create_comparison(
     if let Some(normals) = scans.normals {
         add(&mut parameters, "normals", normals)?;
     }
-    let parameters = work.parameters_from_json(&parameters)?;
-    if let Some(webhook) = webhook {
-        order.webhook = Some(job_webhook(&app, webhook).await?);
-    }
-    let filed = app
-        .service
-        .file_job(work, Some(stress), parameters, order, &counting)
-        .await
-        .map_err(|error| error.naming("volume", WhichScan::Stress.as_str()))?;
-    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
+    let parameters = order.work.parameters_from_json(&parameters)?;
+    let named = [("volume".into(), WhichScan::Stress.as_str().into())];
+    order.file(stress, parameters, &named).await
 }
 
 /// Refuses a query beside a JSON body, in which everything is: what is wrong in it first.

@@ -2,18 +2,14 @@
 
 use crate::app::App;
 use crate::edge::caller::Caller;
-use crate::edge::quota::reserve_job;
 use crate::openapi::{self, UploadProblems, WaitAnswers};
 use crate::resources::files;
-use crate::resources::jobs::filing;
-use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
-use crate::wire::fields::FieldReader;
-use crate::wire::job_fields::{OrderFields, ReadingFields, SendFields};
+use crate::resources::jobs::filing::JsonOrder;
+use crate::resources::products::{Offer, ProductCollection, body_of_product, object_paths};
+use crate::wire::job_fields::ReadingFields;
 use crate::wire::links::path_of;
-use crate::wire::negotiate::preferred_wait;
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::QueryReader;
-use crate::wire::webhook_request::job_webhook;
 use axum::extract::{Request, State};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -108,37 +104,14 @@ pub async fn create_reading(
     request: Request,
 ) -> Answer {
     query.all::<()>()?;
-    let headers = request.headers().clone();
-    let counting = reserve_job(&app, &caller, &headers).await?;
-    let patience = preferred_wait(&headers);
-    if patience.is_some() {
-        products::choose(&headers, &offers())?;
-    }
-    let trace_parent = crate::edge::observe::trace_parent(&request);
-    let mut body = FieldReader::read(&app, request).await?;
-    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let read = JsonOrder::read(&app, &caller, Resource::Reading, offers(), request);
+    let (order, body) = read.await?;
     let stated: ReadingFields = body.all()?;
-    let work = app.service.work_of(Resource::Reading.noun())?;
-    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
-    order.send = send.order(&app, &order.tenant, Resource::Reading.noun(), None)?;
-    let service = &app.service;
-    let tenant = &caller.tenant;
-    let parameters = work.parameters_from_json(&given(&stated)?)?;
-    work.check_order(None, &parameters)?;
-    let signing = service.signing(tenant, parameters).await?;
-    if let Some(webhook) = webhook {
-        order.webhook = Some(job_webhook(&app, webhook).await?);
-    }
-    let filed = service
-        .file_job(
-            work,
-            Some(signing.volume),
-            signing.parameters,
-            order,
-            &counting,
-        )
-        .await?;
-    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
+    let order = order.checked()?;
+    let parameters = order.work.parameters_from_json(&given(&stated)?)?;
+    order.work.check_order(None, &parameters)?;
+    let signing = app.service.signing(&caller.tenant, parameters).await?;
+    order.file(signing.volume, signing.parameters, &[]).await
 }
 
 /// The fields that were given, which have to name a reader.

@@ -2,19 +2,15 @@
 
 use crate::app::App;
 use crate::edge::caller::Caller;
-use crate::edge::quota::reserve_job;
 use crate::openapi::{self, UploadProblems, WaitAnswers};
 use crate::resources::files;
-use crate::resources::jobs::filing;
+use crate::resources::jobs::filing::JsonOrder;
 use crate::resources::named_scan::{add, named_scan};
-use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
-use crate::wire::fields::FieldReader;
-use crate::wire::job_fields::{OrderFields, SendFields, SerialFields};
+use crate::resources::products::{Offer, ProductCollection, body_of_product, object_paths};
+use crate::wire::job_fields::SerialFields;
 use crate::wire::links::path_of;
-use crate::wire::negotiate::preferred_wait;
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::QueryReader;
-use crate::wire::webhook_request::job_webhook;
 use axum::extract::{Request, State};
 use serde::Serialize;
 use serde_json::Value;
@@ -123,19 +119,10 @@ pub async fn create_serial(
     request: Request,
 ) -> Answer {
     query.all::<()>()?;
-    let headers = request.headers().clone();
-    let counting = reserve_job(&app, &caller, &headers).await?;
-    let patience = preferred_wait(&headers);
-    if patience.is_some() {
-        products::choose(&headers, &offers())?;
-    }
-    let trace_parent = crate::edge::observe::trace_parent(&request);
-    let mut body = FieldReader::read(&app, request).await?;
-    let (order, send): (OrderFields, SendFields) = (body.take()?, body.take()?);
+    let read = JsonOrder::read(&app, &caller, Resource::Serial, offers(), request);
+    let (order, body) = read.await?;
     let given: SerialFields = body.all()?;
-    let work = app.service.work_of(Resource::Serial.noun())?;
-    let (mut order, webhook) = order.order(&app, &caller, &headers, trace_parent)?;
-    order.send = send.order(&app, &order.tenant, Resource::Serial.noun(), None)?;
+    let order = order.checked()?;
     let mut volumes = volumes_of(&app, &caller.tenant, given.scans).await?;
     let first = volumes.remove(0);
     let named = (0..volumes.len()).map(|n| (format!("others[{n}]"), format!("scans[{}]", n + 1)));
@@ -147,19 +134,8 @@ pub async fn create_serial(
     if let Some(normals) = given.normals {
         add(&mut parameters, "normals", normals)?;
     }
-    let parameters = work.parameters_from_json(&parameters)?;
-    if let Some(webhook) = webhook {
-        order.webhook = Some(job_webhook(&app, webhook).await?);
-    }
-    let filed = app
-        .service
-        .file_job(work, Some(first), parameters, order, &counting)
-        .await
-        .map_err(|error| {
-            let named = named.iter();
-            named.fold(error, |error, (inner, sent)| error.naming(inner, sent))
-        })?;
-    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
+    let parameters = order.work.parameters_from_json(&parameters)?;
+    order.file(first, parameters, &named).await
 }
 
 /// The volumes that `scans` names, each once.

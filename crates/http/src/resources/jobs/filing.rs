@@ -1,32 +1,36 @@
 //! Filing a job: the row is on disk before the client reads 202.
 //!
 //! `POST /v1/jobs` names a stored volume; [`file_upload`] takes a request that carries the volume
-//! itself, and may wait for the result (`Prefer: wait`).
+//! itself, [`JsonOrder`] one that names what is stored. Both may wait for the result (`Prefer: wait`).
 
 use super::describe;
 use super::priority::PriorityQuery;
 use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::edge::observe;
-use crate::edge::quota::reserve_upload;
+use crate::edge::quota::{reserve_job, reserve_upload};
 use crate::resources::products::{self, Offer};
 use crate::resources::tags::TagQuery;
+use crate::wire::fields::FieldReader;
 use crate::wire::idempotency;
+use crate::wire::job_fields::{OrderFields, SendFields};
 use crate::wire::links::path_of;
 use crate::wire::negotiate;
 use crate::wire::problem::{Answer, Problem};
 use crate::wire::query::QueryReader;
 use crate::wire::upload::{self, Upload};
-use crate::wire::webhook_request::webhook_of_upload;
+use crate::wire::webhook_request::{WebhookRequest, job_webhook, webhook_of_upload};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use serde_json::{Map, Value};
 use std::time::Duration;
 use ventriform_service::base::error::ServiceError;
 use ventriform_service::base::records::{Job, JobState, Priority, Resource, Tags};
 use ventriform_service::callers::Scope;
 use ventriform_service::jobs::Work;
+use ventriform_service::limits::quotas::Counting;
 use ventriform_service::use_cases::filing::JobOrder;
 
 /// Least and greatest `Retry-After`, seconds.
@@ -113,6 +117,138 @@ pub async fn file_upload(
         .await?;
     drop(pins);
     answer(app, caller, filed, patience, &headers, &job.offers).await
+}
+
+/// A request in JSON for a job that may be waited for.
+pub struct JsonOrder<'a> {
+    app: &'a App,
+    caller: &'a Caller,
+    makes: Resource,
+    offers: Vec<Offer>,
+    headers: HeaderMap,
+    trace_parent: Option<String>,
+    /// Ends with the answer: a request that waits for its job counts as a waiting job.
+    counting: Counting,
+    patience: Option<Duration>,
+    fields: OrderFields,
+    send: SendFields,
+}
+
+impl<'a> JsonOrder<'a> {
+    /// Reads the request for a job that makes a result of that kind, as which a client which waits may ask for one of
+    /// `offers`. Returns it beside the fields of the body that not every job has.
+    ///
+    /// # Errors
+    /// If there is no room for the job, none of the offers is acceptable, or the body cannot be used.
+    pub async fn read(
+        app: &'a App,
+        caller: &'a Caller,
+        makes: Resource,
+        offers: Vec<Offer>,
+        request: Request,
+    ) -> Answer<(Self, FieldReader)> {
+        let headers = request.headers().clone();
+        let counting = reserve_job(app, caller, &headers).await?;
+        let patience = negotiate::preferred_wait(&headers);
+        if patience.is_some() {
+            products::choose(&headers, &offers)?;
+        }
+        let trace_parent = observe::trace_parent(&request);
+        let mut body = FieldReader::read(app, request).await?;
+        let (fields, send) = (body.take()?, body.take()?);
+        let order = Self {
+            app,
+            caller,
+            makes,
+            offers,
+            headers,
+            trace_parent,
+            counting,
+            patience,
+            fields,
+            send,
+        };
+        Ok((order, body))
+    }
+
+    /// Checks the fields that every job has.
+    ///
+    /// # Errors
+    /// Those of [`OrderFields::order`] and [`SendFields::order`].
+    pub fn checked(self) -> Answer<CheckedOrder<'a>> {
+        let Self { app, caller, .. } = self;
+        let work = app.service.work_of(self.makes.noun())?;
+        let order = (self.fields).order(app, caller, &self.headers, self.trace_parent)?;
+        let (mut order, webhook) = order;
+        order.send = self
+            .send
+            .order(app, &order.tenant, self.makes.noun(), None)?;
+        Ok(CheckedOrder {
+            app,
+            caller,
+            work,
+            offers: self.offers,
+            headers: self.headers,
+            counting: self.counting,
+            patience: self.patience,
+            order,
+            webhook,
+        })
+    }
+}
+
+/// A [`JsonOrder`] whose fields can be used.
+pub struct CheckedOrder<'a> {
+    app: &'a App,
+    caller: &'a Caller,
+    /// The work of the job.
+    pub work: &'a dyn Work,
+    offers: Vec<Offer>,
+    headers: HeaderMap,
+    counting: Counting,
+    patience: Option<Duration>,
+    order: JobOrder,
+    webhook: Option<WebhookRequest>,
+}
+
+impl CheckedOrder<'_> {
+    /// Files the job on that volume, and answers as [`answer`] does. `named` are the fields of the job's inputs, each with
+    /// the name that the request has for it.
+    ///
+    /// # Errors
+    /// If the webhook cannot be used, or the job cannot be filed.
+    pub async fn file(
+        mut self,
+        volume: String,
+        parameters: Map<String, Value>,
+        named: &[(String, String)],
+    ) -> Answer {
+        let Self { app, caller, .. } = self;
+        if let Some(webhook) = self.webhook {
+            self.order.webhook = Some(job_webhook(app, webhook).await?);
+        }
+        let filed = app.service.file_job(
+            self.work,
+            Some(volume),
+            parameters,
+            self.order,
+            &self.counting,
+        );
+        let renamed = |error: ServiceError| {
+            let named = named.iter();
+            named.fold(error, |error, (inner, sent)| error.naming(inner, sent))
+        };
+        let filed = filed.await.map_err(renamed)?;
+        answer(
+            app,
+            caller,
+            filed,
+            self.patience,
+            &self.headers,
+            &self.offers,
+        )
+        .await
+    }
 }
 
 /// The statements of an upload about its job, in the query or the form.
