@@ -171,6 +171,12 @@ fn sex(text: &str) -> Option<String> {
     Some(letter.to_owned())
 }
 
+/// A date (DA) as `YYYY-MM-DD`; `None` of another text.
+pub fn dashed_date(text: &str) -> Option<String> {
+    let is_date = text.len() == 8 && text.bytes().all(|byte| byte.is_ascii_digit());
+    is_date.then(|| format!("{}-{}-{}", &text[..4], &text[4..6], &text[6..]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,5 +245,13 @@ mod tests {
         let long = format!("{group}B={group}={group}C=D");
         let cut = format!("{group}={group}={group}");
         assert_eq!(Text::Name.fitted(&long), Some(cut));
+    }
+
+    #[test]
+    fn dates_have_eight_digits() {
+        assert_eq!(dashed_date("20261130").unwrap(), "2026-11-30");
+        for other in ["", "2026.11.30", "2026113", "2026113x", "２026113"] {
+            assert_eq!(dashed_date(other), None, "{other}");
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use ventriform_dicom::values::dashed_date;
 
 macro_rules! provenance {
     ($($(#[$doc:meta])* $field:ident,)*) => {
@@ -160,13 +161,7 @@ impl Provenance {
     /// The date of [`Provenance::moment`] as `YYYY-MM-DD`; another text as it is.
     pub fn day(&self) -> Option<String> {
         let (date, _) = self.moment()?;
-        let parts = (date.get(..4), date.get(4..6), date.get(6..8));
-        Some(match parts {
-            (Some(year), Some(month), Some(day)) if date.len() == 8 => {
-                format!("{year}-{month}-{day}")
-            }
-            _ => date.to_owned(),
-        })
+        Some(dashed_date(date).unwrap_or_else(|| date.to_owned()))
     }
 
     /// The fields by which two headers name two patients. The name decides only where no number does: it changes by

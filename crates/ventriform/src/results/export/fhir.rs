@@ -20,6 +20,7 @@ use super::dicom::DicomError;
 use serde_json::{Map, Value, json};
 use ventriform_dicom::report::{Concept, ContentItem, ContentValue, StructuredReport};
 use ventriform_dicom::tags;
+use ventriform_dicom::values::dashed_date;
 use ventriform_dicom::write::uid::derived_urn;
 
 /// The name of the file.
@@ -93,7 +94,9 @@ impl<'a> Mapping<'a> {
             issued: date
                 .zip(time)
                 .and_then(|(date, time)| instant(&date, &time)),
-            study_day: report.text(tags::STUDY_DATE).and_then(|date| day(&date)),
+            study_day: report
+                .text(tags::STUDY_DATE)
+                .and_then(|date| dashed_date(&date)),
             entries: Vec::new(),
             report,
         }
@@ -179,7 +182,7 @@ impl<'a> Mapping<'a> {
         put(
             &mut patient,
             "birthDate",
-            json!(born.and_then(|date| day(&date))),
+            json!(born.and_then(|date| dashed_date(&date))),
         );
         let gender = self.report.text(tags::PATIENT_SEX);
         let gender = gender.map(|sex| match sex.as_str() {
@@ -466,16 +469,10 @@ fn human_name(name: &str) -> Value {
     human.into()
 }
 
-/// `YYYY-MM-DD` of a value of VR DA.
-fn day(date: &str) -> Option<String> {
-    let whole = date.len() == 8 && date.bytes().all(|digit| digit.is_ascii_digit());
-    whole.then(|| format!("{}-{}-{}", &date[..4], &date[4..6], &date[6..]))
-}
-
 /// A moment of VR DA and TM, UTC.
 fn instant(date: &str, time: &str) -> Option<String> {
     let whole = time.len() >= 6 && time.as_bytes()[..6].iter().all(u8::is_ascii_digit);
-    let day = day(date).filter(|_| whole)?;
+    let day = dashed_date(date).filter(|_| whole)?;
     Some(format!(
         "{day}T{}:{}:{}Z",
         &time[..2],

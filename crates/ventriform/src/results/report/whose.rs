@@ -4,6 +4,7 @@ use crate::image::draw::text::leaves;
 use crate::image::volume::Provenance;
 use maud::{Markup, html};
 use serde_json::json;
+use ventriform_dicom::values::dashed_date;
 
 /// Patient, study and series of `scan`, as far as they are known; nothing where none is. What is to be
 /// shown to whom is decided before: an absent field is left out.
@@ -157,12 +158,7 @@ pub(super) fn person(name: &str) -> String {
 
 /// A date (`YYYYMMDD`) with hyphens; any other text as it is.
 fn day(date: &str) -> String {
-    let digits = date.len() == 8 && date.bytes().all(|byte| byte.is_ascii_digit());
-    if digits {
-        format!("{}-{}-{}", &date[..4], &date[4..6], &date[6..])
-    } else {
-        date.to_owned()
-    }
+    dashed_date(date).unwrap_or_else(|| date.to_owned())
 }
 
 /// A time (`HHMMSS.FFFFFF`, as far as it is stated) to the minute; any other text as it is.
