@@ -8,7 +8,7 @@ import { number } from "../words";
 import { type Compared, type NamedMap, beatRowsOf, mapsOf } from "./compared";
 import { type ComparedScene, type Written, usePlace } from "./comparedscene";
 import type { Lut } from "./colours";
-import { Readout, Scale, SharedMap, UptakeColours, lutOf, valueThere } from "./mapsrow";
+import { Readout, Scale, SharedMap, UptakeColours, lutOf, valueThere, LabelChoice } from "./mapsrow";
 import { type DrawnMap, FIGURES, drawPolar, middleOfSegment, onMap, placeOnMap, segmentAt } from "./polar";
 
 /** A map of uptake with the scores of its segments written on it. */
@@ -60,16 +60,7 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
   return (
     <section class="compared-maps" aria-label="Polar maps">
       <div class="toolbar" role="toolbar" aria-label="Polar maps">
-        <label class="inline">
-          On the maps
-          <select value={written} onChange={event => (scene.written.value = event.currentTarget.value as Written)}>
-            {choices.map(([value, text]) => (
-              <option key={value} value={value}>
-                {text}
-              </option>
-            ))}
-          </select>
-        </label>
+        <LabelChoice choices={choices} value={written} choose={value => (scene.written.value = value)} />
         <UptakeColours lut={scene.lut} />
       </div>
       {beatRows.length > 0 ? (

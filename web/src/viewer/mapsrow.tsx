@@ -4,10 +4,10 @@ import type { ComponentChildren } from "preact";
 import { type Watched, useWatched } from "../state";
 import { number } from "../words";
 import { useCanvas } from "./canvas";
-import { LUTS, type Lut, WALL_LUT, keep } from "./colours";
+import { type Lut, WALL_LUT } from "./colours";
 import type { NamedMap } from "./compared";
 import { figureLut, isInValvePlane, placeOnMap, segmentAt, valueAt } from "./polar";
-import { ColourBar } from "./wall";
+import { ColourBar, LutChoice } from "./wall";
 
 /** A map, its name and what it shows. */
 export type TitledMap = Pick<NamedMap, "name" | "short" | "map" | "figure" | "lut">;
@@ -35,19 +35,30 @@ export function Scale({ named, lut }: { named: TitledMap; lut: Lut }) {
 }
 
 /** Which colours maps and walls show uptake in. */
-export function UptakeColours({ lut: watched }: { lut: Watched<Lut> }) {
-  const lut = useWatched(watched);
+export function UptakeColours({ lut }: { lut: Watched<Lut> }) {
   return (
     <label class="inline">
-      <select
-        aria-label="Colours of uptake"
-        value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
-        onChange={event => {
-          watched.value = LUTS[event.currentTarget.value]!;
-          keep(WALL_LUT, event.currentTarget.value);
-        }}>
-        {Object.keys(LUTS).map(name => (
-          <option key={name}>{name}</option>
+      <LutChoice label="Colours of uptake" lut={lut} keptAs={WALL_LUT} />
+    </label>
+  );
+}
+
+interface LabelProps<T extends string> {
+  choices: [T, string][];
+  value: T;
+  choose(value: T): void;
+}
+
+/** The choice of what is written on the maps. */
+export function LabelChoice<T extends string>({ choices, value, choose }: LabelProps<T>) {
+  return (
+    <label class="inline">
+      On the maps
+      <select value={value} onChange={event => choose(event.currentTarget.value as T)}>
+        {choices.map(([choice, text]) => (
+          <option key={choice} value={choice}>
+            {text}
+          </option>
         ))}
       </select>
     </label>

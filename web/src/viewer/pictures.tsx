@@ -4,14 +4,14 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useWatched } from "../state";
 import { counts } from "../words";
-import { LUT, LUTS, keep } from "./colours";
+import { LUT } from "./colours";
 import { PATIENT, heartPlanes } from "./plane";
 import type { Layer, Scene, Tool } from "./scene";
 import { screenshot } from "./screenshot";
 import { HEART_WIDTH, type Shown, layersOf } from "./shown";
 import { Slice } from "./slice";
 import { Stack } from "./stack";
-import { ColourBar, Wall, uptake } from "./wall";
+import { ColourBar, LutChoice, Wall, uptake } from "./wall";
 
 interface Props {
   scene: Scene;
@@ -129,17 +129,7 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
           ))}
         </span>
         <label class="inline">
-          <select
-            aria-label="Colours"
-            value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
-            onChange={event => {
-              scene.lut.value = LUTS[event.currentTarget.value]!;
-              keep(LUT, event.currentTarget.value);
-            }}>
-            {Object.keys(LUTS).map(name => (
-              <option key={name}>{name}</option>
-            ))}
-          </select>
+          <LutChoice label="Colours" lut={scene.lut} keptAs={LUT} />
         </label>
         <label class="inline brightness">
           <ColourBar lut={lut} low={counts(window_.low)} high={counts(window_.high)} />

@@ -4,7 +4,7 @@ import { useMemo, useState } from "preact/hooks";
 import { useWatched } from "../state";
 import { number } from "../words";
 import { useCanvas } from "./canvas";
-import { LUTS, WALL_LUT, keep } from "./colours";
+import { WALL_LUT } from "./colours";
 import type { Mesh } from "./mesh";
 import type { PolarMap } from "../generated/openapi";
 import {
@@ -20,7 +20,7 @@ import {
 } from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
-import { ColourBar } from "./wall";
+import { ColourBar, LutChoice } from "./wall";
 
 interface Props {
   scene: Scene;
@@ -95,17 +95,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
         </p>
         <span class="inline">
           <ColourBar lut={lut} low="0" high="100 %" />
-          <select
-            aria-label="Colours of polar map and wall"
-            value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
-            onChange={event => {
-              scene.wallLut.value = LUTS[event.currentTarget.value]!;
-              keep(WALL_LUT, event.currentTarget.value);
-            }}>
-            {Object.keys(LUTS).map(name => (
-              <option key={name}>{name}</option>
-            ))}
-          </select>
+          <LutChoice label="Colours of polar map and wall" lut={scene.wallLut} keptAs={WALL_LUT} />
         </span>
         <div class="options">
           <label class="inline">

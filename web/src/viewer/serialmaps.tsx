@@ -4,7 +4,7 @@ import { useMemo, useState } from "preact/hooks";
 import { Watched, useWatched } from "../state";
 import { number } from "../words";
 import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";
-import { Readout, Scale, SharedMap, type TitledMap, UptakeColours, lutOf } from "./mapsrow";
+import { Readout, Scale, SharedMap, type TitledMap, UptakeColours, lutOf, LabelChoice } from "./mapsrow";
 import { type PolarLabels, drawPolar } from "./polar";
 import { type Pair, type Series, oddScans, uptakeOf, verdictWords } from "./serial";
 
@@ -62,16 +62,7 @@ export function SerialMaps({ series, pair }: { series: Series; pair: Pair }) {
   return (
     <section class="pictures compared-maps serial-maps" aria-label="Polar maps">
       <div class="toolbar" role="toolbar" aria-label="Polar maps">
-        <label class="inline">
-          On the maps
-          <select value={written} onChange={event => setWritten(event.currentTarget.value as PolarLabels)}>
-            {WRITTEN.map(([value, text]) => (
-              <option key={value} value={value}>
-                {text}
-              </option>
-            ))}
-          </select>
-        </label>
+        <LabelChoice choices={WRITTEN} value={written} choose={value => setWritten(value)} />
         <UptakeColours lut={scene.lut} />
         {report.scans.length > 2 && (
           <label class="inline">

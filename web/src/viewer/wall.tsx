@@ -1,10 +1,10 @@
 // The wall in three dimensions with a colour for what the files offer, and its colour bar.
 
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
-import { useWatched } from "../state";
+import { type Watched, useWatched } from "../state";
 import { type Camera, type MeshPainter, boundsOf, project, turn, usualCamera } from "./camera";
 import { useCanvas } from "./canvas";
-import { DIVERGING, LUTS, type Lut, css } from "./colours";
+import { DIVERGING, LUTS, type Lut, css, keep } from "./colours";
 import { handleEvents } from "./events";
 import { FlatView } from "./flatview";
 import { MeshView } from "./glview";
@@ -387,4 +387,22 @@ function listen(
     keydown: press,
     webglcontextlost: lost,
   });
+}
+
+/** The choice of colours; it is kept under `keptAs`. */
+export function LutChoice({ label, lut: watched, keptAs }: { label: string; lut: Watched<Lut>; keptAs: string }) {
+  const lut = useWatched(watched);
+  return (
+    <select
+      aria-label={label}
+      value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
+      onChange={event => {
+        watched.value = LUTS[event.currentTarget.value]!;
+        keep(keptAs, event.currentTarget.value);
+      }}>
+      {Object.keys(LUTS).map(name => (
+        <option key={name}>{name}</option>
+      ))}
+    </select>
+  );
 }
