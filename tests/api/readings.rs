@@ -14,20 +14,6 @@ const VERIFICATION_FLAG: Tag = Tag(0x0040, 0xA493);
 const VERIFYING_OBSERVERS: Tag = Tag(0x0040, 0xA073);
 
 impl TestApp {
-    /// Fits a model to the volume of these words; returns the id of the segmentation.
-    async fn fitted(&self, said: &str) -> String {
-        let volume = self.volume(said).await;
-        let model = self
-            .post("/v1/models")
-            .body(crate::helpers::volume("sphere model"));
-        let model = model.send().await.unwrap().json().await.unwrap();
-        let model = self.until(&model, &["succeeded"]).await;
-        let order = json!({"kind": "segmentation", "volume": volume, "parameters": {"model": model["model"]}});
-        let job = self.post("/v1/jobs").json(&order).send().await.unwrap();
-        let job = self.until(&job.json().await.unwrap(), &["succeeded"]).await;
-        text(&job["segmentation"])
-    }
-
     /// Signs a reading; returns it.
     pub async fn reading(&self, stated: Value) -> Value {
         let answer = self
@@ -56,7 +42,7 @@ pub fn stated(result: &str) -> Value {
 #[tokio::test]
 async fn a_reading_is_signed_listed_amended_and_goes_with_the_scan() {
     let app = TestApp::start().await;
-    let result = app.fitted("sphere read").await;
+    let result = text(&app.segmentation("sphere read").await["id"]);
     let first = app.reading(stated(&result)).await;
     assert_eq!(first["summary"]["sss"], 4);
     assert_eq!(first["summary"]["reader"], "Doe^Jane^^Dr.");
@@ -122,7 +108,7 @@ async fn a_reading_is_signed_listed_amended_and_goes_with_the_scan() {
 #[tokio::test]
 async fn what_cannot_be_signed_is_refused_by_field() {
     let app = TestApp::start().await;
-    let result = app.fitted("sphere read").await;
+    let result = text(&app.segmentation("sphere read").await["id"]);
     let refused = async |change: &dyn Fn(&mut Value)| {
         let mut order = stated(&result);
         change(&mut order);
@@ -179,7 +165,7 @@ async fn what_cannot_be_signed_is_refused_by_field() {
 #[tokio::test]
 async fn a_text_must_not_name_the_patient() {
     let app = TestApp::start().await;
-    let result = app.fitted("sphere read").await;
+    let result = text(&app.segmentation("sphere read").await["id"]);
     let volume = app.json(&format!("/v1/segmentations/{result}")).await;
     let volume = text(&volume["volume"]);
     let identity =
@@ -215,7 +201,7 @@ async fn only_the_scope_sign_signs_and_erases() {
         as_key(Scope::Sign).await,
     );
     closed(&app).await;
-    let result = submit.fitted("sphere read").await;
+    let result = text(&submit.segmentation("sphere read").await["id"]);
     for weak in [&read, &submit] {
         let answer = weak
             .post("/v1/readings")

@@ -13,7 +13,7 @@ fn part(words: &str) -> Part {
 
 impl TestApp {
     /// Makes a segmentation; returns it.
-    async fn segmentation(&self, words: &str) -> Value {
+    pub async fn segmentation(&self, words: &str) -> Value {
         let answer = self
             .post("/v1/segmentations")
             .body(volume(words))

@@ -577,12 +577,13 @@ fn media_type_of(name: &str) -> &'static str {
 fn schema_of(folder: &str, name: &str) -> Value {
     match (name, media_type_of(name)) {
         (FHIR_FILE, _) => reference("FhirBundle"),
+        ("beat.json", _) => reference("BeatReport"),
+        ("comparison.json", _) => reference("ComparisonReport"),
+        ("serial.json", _) => reference("SerialReport"),
         ("reading.json", _) => reference("ReadingReport"),
-        // A reading keeps the report of what was read.
-        ("report.json", _) if folder.contains("readings") => reference("SegmentationReport"),
-        ("beat.json", _) if folder.contains("readings") => reference("BeatReport"),
-        ("comparison.json", _) if folder.contains("readings") => reference("ComparisonReport"),
-        ("report.json" | "beat.json" | "comparison.json" | "serial.json", _) => report_of(folder),
+        ("report.json", _) if folder.starts_with("/v1/models") => reference("ModelReport"),
+        // Of a segmentation, or kept by a reading of one.
+        ("report.json", _) => reference("SegmentationReport"),
         ("distance.json", _) => reference("Closeness"),
         (
             "polar.json" | "polar_ed.json" | "polar_es.json" | "polar_stress.json"

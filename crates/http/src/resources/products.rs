@@ -174,7 +174,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     if !P::MESH_NAMES.is_empty() {
         file = file.parameters::<PartQuery>();
     }
-    if !dicom::made_on_request(P::RESOURCE_KIND).is_empty() {
+    if !dicom::objects(P::RESOURCE_KIND).is_empty() {
         file = file
             .parameters::<DeidentifyQuery>()
             .answers::<DicomProblems>();
@@ -614,18 +614,15 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison or a reading of one then
-    /// the one at rest, of a serial comparison then all others.
+    /// The fields of the scans that the page of `product` names: that of its volume, then those of its other scans.
     async fn sees(self, app: &App, product: &Product) -> Answer<Vec<Map<String, Value>>> {
-        let field = match product.resource() {
-            Resource::Comparison | Resource::Reading => Some(REST_FIELD),
-            Resource::Serial => Some(OTHERS_FIELD),
-            _ => None,
-        };
-        let others = field.and_then(|field| product.parameters.get(field)?.as_str());
-        let others = others.into_iter().flat_map(|ids| ids.split(','));
         let mut scans = Vec::new();
-        for volume in product.volume.as_deref().into_iter().chain(others) {
+        for volume in product
+            .volume
+            .as_deref()
+            .into_iter()
+            .chain(product.other_scans())
+        {
             let scan = match self.deidentify {
                 true => None,
                 false => app.service.scan(self.tenant, volume).await?,
@@ -655,11 +652,6 @@ async fn send_named(
     }
     Err(lacks_file(product, name))
 }
-
-/// The parameter of a comparison, and of a reading of one, that names the volume at rest.
-const REST_FIELD: &str = "rest";
-/// The parameter of a serial comparison that names the other volumes.
-const OTHERS_FIELD: &str = "others";
 
 /// Whether a product of that kind may have a mesh of this name.
 fn is_mesh<P: ProductCollection>(name: &str) -> bool {

@@ -7,7 +7,7 @@ use crate::base::records::{
     BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, ProductFile,
     Resource, StoreError, StoreFault, Tenant,
 };
-use serde_json::{Map, Value};
+use serde_json::Map;
 use std::ops::Range;
 
 /// Templates read from the catalogue at a time.
@@ -162,7 +162,7 @@ impl Items {
             return Ok(None);
         };
         let mut others = Vec::new();
-        for id in other_volumes(&product) {
+        for id in product.other_scans() {
             let Some(other) = self.source(tenant, Some(id)).await? else {
                 return Ok(None);
             };
@@ -228,15 +228,4 @@ impl Items {
         library.sort_by(|a, b| a.id.cmp(&b.id));
         Ok(library)
     }
-}
-
-/// The ids of the other volumes whose scans the objects of a product name.
-fn other_volumes(product: &Product) -> impl Iterator<Item = &str> {
-    let field = match product.resource() {
-        Resource::Comparison | Resource::Reading => "rest",
-        Resource::Serial => "others",
-        _ => "",
-    };
-    let named = product.parameters.get(field).and_then(Value::as_str);
-    named.into_iter().flat_map(|ids| ids.split(','))
 }

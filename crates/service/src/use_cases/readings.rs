@@ -40,10 +40,8 @@ impl Service {
         let text = |name: &str| Some(parameters.get(name)?.as_str()?.to_owned());
         let id = text("result").unwrap_or_default();
         let result = self.product(tenant, &id).await?;
-        let Some(result) = result.map(|result| result.item) else {
-            return Err(self.names_nothing(tenant, "result", &id).await?);
-        };
-        let Some(volume) = result.volume.clone() else {
+        let result = result.and_then(|own| Some((own.item.volume.clone()?, own.item)));
+        let Some((volume, result)) = result else {
             return Err(self.names_nothing(tenant, "result", &id).await?);
         };
         let amends = text("amends");
@@ -51,8 +49,7 @@ impl Service {
         if amends != newest {
             return Err(already_read(newest.as_deref()));
         }
-        let rest = result.parameters.get("rest").and_then(Value::as_str);
-        let rest = rest.filter(|_| result.resource() == Resource::Comparison);
+        let rest = result.other_scans().next();
         for scanned in std::iter::once(volume.as_str()).chain(rest) {
             let scan = self.scan(tenant, scanned).await?;
             refuse_names(scan.as_ref(), &parameters)?;

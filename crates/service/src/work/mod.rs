@@ -34,7 +34,7 @@ mod page;
 mod parameters;
 pub mod part;
 mod profile;
-pub mod reading;
+mod reading;
 mod segmentation;
 mod serial;
 mod template;

@@ -15,7 +15,7 @@ use ventriform::results::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
     ReadingReport, SegmentationPage, SegmentationReport, SerialPage, SerialReport,
 };
-use ventriform::runs::reading::{self, READING_FILE, kept_files, report_file};
+use ventriform::runs::reading::{self, READING_FILE, report_file};
 use ventriform::runs::serial;
 
 /// Why there is no page.
@@ -95,7 +95,7 @@ pub(super) fn serial_files() -> &'static [&'static str] {
     &FILES
 }
 
-/// The page of a reading, made of `reading.json` and the files that it keeps of the result.
+/// The page of a reading, made of `reading.json`, and of the report and the pictures that it keeps of the result.
 ///
 /// # Errors
 /// [`PageError`].
@@ -106,16 +106,12 @@ pub(super) fn reading_page(
     let stated: ReadingReport = from_json(READING_FILE, &required(read, READING_FILE)?)?;
     let name = report_file(stated.kind);
     let report: Map<String, Value> = from_json(name, &required(read, name)?)?;
-    let mut pictures = Vec::new();
-    for name in kept_files(stated.kind) {
-        pictures.extend(optional(read, name)?.map(|bytes| (name, bytes)));
-    }
-    let content = |wanted: &str| {
-        let found = pictures.iter().find(|(name, _)| *name == wanted);
-        found.map(|(_, bytes)| bytes.clone())
-    };
-    let scan = first(scans);
-    Ok(reading::page(&stated, &report, content, Some(&scan)))
+    reading::page(
+        &stated,
+        &report,
+        |name| optional(read, name),
+        Some(&first(scans)),
+    )
 }
 
 /// The wall at end diastole and at end systole.

@@ -1,5 +1,6 @@
 //! Jobs of kind `reading`: [`ventriform::runs::reading`] over a stored result, which the parameter `result` names.
 
+use super::comparison::REST_FIELD;
 use super::failures::broken_result;
 use super::models::named_item;
 use super::{page, parameters};
@@ -9,22 +10,19 @@ use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use serde_json::{Map, Value};
 use ventriform::base::progress::{Monitor, Plan, Stage};
 use ventriform::parameters::{Parameters, ReadingParameters};
-use ventriform::results::report::ReadKind;
+use ventriform::results::report::{ReadKind, ReadingSummary, object};
 use ventriform::runs::advice::Explain;
-use ventriform::runs::reading::{FILE_NAMES, files, read, report_file, report_of, summary};
+use ventriform::runs::reading::{FILE_NAMES, PAGE_FILES, files, read, report_file, report_of};
 
 /// The parameter that names the result.
-pub const RESULT_FIELD: &str = "result";
-
-/// The parameter that names the volume at rest of a comparison.
-const REST_FIELD: &str = "rest";
+pub(super) const RESULT_FIELD: &str = "result";
 
 /// Writes what a reader states of a result.
 #[derive(Debug, Clone, Copy)]
 pub struct ReadingWork;
 
 /// The kind of the result with that id; `None` if such results are not read.
-pub fn kind_of(result: &str) -> Option<ReadKind> {
+pub(super) fn kind_of(result: &str) -> Option<ReadKind> {
     match Resource::from_id(result)? {
         Resource::Comparison => Some(ReadKind::Comparison),
         Resource::Segmentation => Some(ReadKind::Segmentation),
@@ -99,26 +97,16 @@ impl Work for ReadingWork {
         let report = report.ok_or_else(missing)?;
         let report = report_of(&report).map_err(|error| error.explain())?;
         let reading = read(&stated, kind, &report).map_err(|error| error.explain())?;
-        let mut failed = None;
-        let files = files(&reading, |name| match content(name) {
-            Ok(bytes) => bytes,
-            Err(error) => {
-                failed = Some(error);
-                None
-            }
-        });
-        if let Some(error) = failed {
-            return Err(broken_result(&error).into());
-        }
+        let files = files(&reading, content).map_err(|error| broken_result(&error))?;
         monitor.report(Stage::Report, 1.0)?;
         Ok(WorkOutput {
-            summary: summary(&reading),
+            summary: object(&ReadingSummary::from_reading(&reading)),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
     }
 
     fn page_files(&self) -> &'static [&'static str] {
-        FILE_NAMES
+        PAGE_FILES
     }
 
     fn page(&self, reading: &StoredItem, scans: &[Map<String, Value>]) -> Result<String, Failure> {

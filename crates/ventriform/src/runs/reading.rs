@@ -8,7 +8,7 @@
 
 use crate::image::volume::Provenance;
 use crate::parameters::ReadingParameters;
-use crate::results::report::{self, ReadKind, ReadingPage, ReadingReport, ReadingSummary, object};
+use crate::results::report::{self, ReadKind, ReadingPage, ReadingReport};
 use crate::runs::segmentation::{NamedFile, json_file};
 use serde_json::{Map, Value};
 
@@ -24,6 +24,23 @@ pub const FILE_NAMES: &[&str] = &[
     "beat.json",
     "mask.nii.gz",
     "mesh.json",
+    "slices.png",
+    "polar_stress.svg",
+    "polar_rest.svg",
+    "polar_difference.svg",
+    "polar.svg",
+    "polar_motion.svg",
+    "polar_thickening.svg",
+    "polar_phase.svg",
+    "curve.svg",
+];
+
+/// Those of them that [`page`] is made of.
+pub const PAGE_FILES: &[&str] = &[
+    READING_FILE,
+    "comparison.json",
+    "report.json",
+    "beat.json",
     "slices.png",
     "polar_stress.svg",
     "polar_rest.svg",
@@ -155,47 +172,48 @@ pub fn read(
 }
 
 /// The files of a reading; `content` gives those of the result, by name.
-pub fn files(
+///
+/// # Errors
+/// Those of `content`.
+pub fn files<E>(
     reading: &ReadingReport,
-    mut content: impl FnMut(&str) -> Option<Vec<u8>>,
-) -> Vec<NamedFile> {
+    content: impl Fn(&'static str) -> Result<Option<Vec<u8>>, E>,
+) -> Result<Vec<NamedFile>, E> {
     let mut files = vec![json_file(READING_FILE, reading)];
     for name in kept_files(reading.kind) {
-        files.extend(content(name).map(|bytes| NamedFile {
+        files.extend(content(name)?.map(|bytes| NamedFile {
             name: name.to_owned(),
             media_type: media_type(name),
             bytes,
         }));
     }
-    files
-}
-
-/// The main statements.
-pub fn summary(reading: &ReadingReport) -> Map<String, Value> {
-    object(&ReadingSummary::from_reading(reading))
+    Ok(files)
 }
 
 /// The reading of a result with this report as a self-contained page; `content` gives its files, by name. It names whose scan
 /// it is as far as `scan` does.
-pub fn page(
+///
+/// # Errors
+/// Those of `content`.
+pub fn page<E>(
     reading: &ReadingReport,
     report: &Map<String, Value>,
-    mut content: impl FnMut(&str) -> Option<Vec<u8>>,
+    content: impl Fn(&'static str) -> Result<Option<Vec<u8>>, E>,
     scan: Option<&Provenance>,
-) -> String {
-    let found = pictures(reading.kind).iter();
-    let found: Vec<_> = found
-        .filter_map(|(name, title)| Some((*title, media_type(name), content(name)?)))
-        .collect();
+) -> Result<String, E> {
+    let mut found = Vec::new();
+    for (name, title) in pictures(reading.kind) {
+        found.extend(content(name)?.map(|bytes| (*title, media_type(name), bytes)));
+    }
     let pictures: Vec<_> = (found.iter())
         .map(|(title, media_type, bytes)| (*title, *media_type, bytes.as_slice()))
         .collect();
-    report::reading_page(&ReadingPage {
+    Ok(report::reading_page(&ReadingPage {
         reading,
         report,
         pictures: &pictures,
         scan,
-    })
+    }))
 }
 
 fn media_type(name: &str) -> &'static str {
@@ -224,17 +242,19 @@ mod tests {
     fn a_reading_keeps_report_and_pictures_of_the_result() {
         let report = report_of(br#"{"ef_percent": 60, "edv_ml": 100}"#).unwrap();
         let reading = read(&stated(), ReadKind::Beat, &report).unwrap();
-        let files = files(&reading, |name| {
-            name.starts_with('c').then(|| b"<svg/>".to_vec())
-        });
+        let content = |name: &str| Ok::<_, ()>(name.starts_with('c').then(|| b"<svg/>".to_vec()));
+        let files = files(&reading, content).unwrap();
         let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
         assert_eq!(names, [READING_FILE, "curve.svg"]);
-        let page = page(&reading, &report, |_| None, None);
+        let page = page(&reading, &report, |_| Ok::<_, ()>(None), None).unwrap();
         for said in ["Normal.", "read by Doe, Jane", "Ejection fraction"] {
             assert!(page.contains(said), "{said}");
         }
         for kind in [ReadKind::Comparison, ReadKind::Segmentation, ReadKind::Beat] {
             assert!(kept_files(kind).all(|name| FILE_NAMES.contains(&name)));
+            let shown = pictures(kind).iter().map(|(name, _)| *name);
+            let mut shown = shown.chain([READING_FILE, report_file(kind)]);
+            assert!(shown.all(|name| PAGE_FILES.contains(&name)));
         }
     }
 

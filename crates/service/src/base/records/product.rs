@@ -61,6 +61,18 @@ impl Product {
         Resource::from_id(&self.id).unwrap_or(Resource::Model)
     }
 
+    /// The ids of the volumes of its other scans: of a comparison, or of a reading of one, that at rest; of a serial
+    /// comparison those of all but the first.
+    pub fn other_scans(&self) -> impl Iterator<Item = &str> {
+        let field = match self.resource() {
+            Resource::Comparison | Resource::Reading => Some("rest"),
+            Resource::Serial => Some("others"),
+            _ => None,
+        };
+        let named = field.and_then(|field| self.parameters.get(field)?.as_str());
+        named.into_iter().flat_map(|ids| ids.split(','))
+    }
+
     /// The file with that name.
     pub fn file(&self, name: &str) -> Option<&ProductFile> {
         self.files.iter().find(|file| file.name == name)

@@ -1,10 +1,9 @@
 //! DICOM objects of a stored comparison: of the study of the scan at stress.
 
 use super::super::failures::broken_result;
-use super::super::upload::UploadFacts;
 use super::{scan, stored};
 use crate::base::records::Failure;
-use crate::items::{StoredResult, StoredSource};
+use crate::items::StoredResult;
 use ventriform::image::volume::ReadLimits;
 use ventriform::results::export::dicom::{
     ComparisonObject, DicomComparison, SignedReading, SourceScan, Structure,
@@ -37,13 +36,9 @@ pub fn object(
     let bytes = stored::required(&result.files, REPORT_FILE)?;
     let report: ComparisonReport = stored::report(&bytes)?;
     let text = stored::report_text(&bytes)?;
-    let source = |source: &StoredSource| {
-        let facts =
-            UploadFacts::from_volume(&source.volume).map_err(|error| broken_result(&error))?;
-        // Gates are added up: the scan is all of them.
-        scan::source((source, result.made_at), &facts, None, secret, limits)
-    };
-    let scans = [source(&result.source)?, source(rest)?];
+    let scans = [&result.source, rest];
+    let [stress, rest] = scans.map(|source| scan::whole(source, result.made_at, secret, limits));
+    let scans = [stress?, rest?];
     let structure = Structure::from_organ("left_ventricle");
     let [stress, rest] = scans.each_ref().map(SourceScan::shown);
     // Objects that are freed of the identity say nothing of the headers.

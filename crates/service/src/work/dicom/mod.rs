@@ -128,10 +128,7 @@ impl ResultObject {
             Self::Beat(object) => beat::source_files(object, product),
             Self::Comparison(object) => comparison::source_files(object),
             Self::Serial => vec![serial::REPORT_FILE.to_owned()],
-            Self::Reading => {
-                let files = product.files.iter();
-                files.map(|file| file.name.clone()).collect()
-            }
+            Self::Reading => reading::source_files(product),
             Self::Fhir => {
                 let report = structured_report(product.resource());
                 report.map_or_else(Vec::new, |report| report.source_files(product))
@@ -231,8 +228,7 @@ fn made(
         }
         ResultObject::Serial => serial::measurements(result, secret, limits),
         ResultObject::Reading => {
-            let stated = reading::statement(result)?;
-            reading::measurements(result, &stated, secret, limits)
+            reading::measurements(result, &reading::statement(result)?, secret, limits)
         }
         ResultObject::Fhir => Ok(None),
     }
@@ -248,11 +244,14 @@ fn fhir(
     let Some(object) = kind.and_then(structured_report) else {
         return Ok(None);
     };
-    let amended = match object {
-        ResultObject::Reading => reading::statement(result)?.amends.is_some(),
-        _ => false,
+    let (report, amended) = match object {
+        ResultObject::Reading => {
+            let stated = reading::statement(result)?;
+            let report = reading::measurements(result, &stated, secret, limits)?;
+            (report, stated.amends.is_some())
+        }
+        _ => (made(result, object, None, secret, limits)?, false),
     };
-    let report = made(result, object, None, secret, limits)?;
     let bundle = report.map(|report| bundle(&report, amended)).transpose();
     bundle.map_err(|error| error.explain())
 }

@@ -1,8 +1,9 @@
 //! The structured report of a result with what a reader states of it, from the files that the reading keeps.
 
 use super::super::failures::broken_result;
+use super::super::reading::{RESULT_FIELD, kind_of};
 use super::{ResultObject, stored};
-use crate::base::records::{Failure, Resource};
+use crate::base::records::{Failure, Product};
 use crate::items::{StoredItem, StoredResult};
 use serde_json::Value;
 use ventriform::image::volume::ReadLimits;
@@ -13,12 +14,20 @@ use ventriform::results::report::{ReadKind, ReadingReport};
 use ventriform::runs::reading::{READING_FILE, report_file};
 
 /// The object of the result to which a reading of that kind is added.
-pub fn unread(kind: ReadKind) -> ResultObject {
+fn unread(kind: ReadKind) -> ResultObject {
     match kind {
         ReadKind::Comparison => ResultObject::Comparison(ComparisonObject::Measurements),
         ReadKind::Segmentation => ResultObject::Still(DicomObject::Measurements),
         ReadKind::Beat => ResultObject::Beat(BeatObject::Measurements),
     }
+}
+
+/// The names of the files of the reading `product` of which its structured report is made.
+pub fn source_files(product: &Product) -> Vec<String> {
+    let result = product.parameters.get(RESULT_FIELD).and_then(Value::as_str);
+    let unread = result.and_then(kind_of).map(unread);
+    let kept = unread.map_or_else(Vec::new, |object| object.source_files(product));
+    [READING_FILE.to_owned()].into_iter().chain(kept).collect()
 }
 
 /// What a reading states.
@@ -39,14 +48,12 @@ pub fn measurements(
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<u8>>, Failure> {
-    let id = stated.result.clone().unwrap_or_default();
+    let nameless = || broken_result(&"the reading does not say what was read");
+    let id = stated.result.clone().ok_or_else(nameless)?;
     let report = stored::required(&reading.files, report_file(stated.kind))?;
     let report: Value = stored::report(&report)?;
     let parameters = report.get("parameters").and_then(Value::as_object);
     let parameters = parameters.cloned().unwrap_or_default();
-    if Resource::from_id(&id).is_none() {
-        return Err(broken_result(&"the reading does not say what was read"));
-    }
     // The files that the reading keeps are those of the result that was read.
     let result = StoredResult {
         files: StoredItem {

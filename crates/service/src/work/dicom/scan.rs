@@ -89,6 +89,20 @@ pub fn source(
     })
 }
 
+/// [`source`] of all gates of a stored volume together.
+///
+/// # Errors
+/// As there, and if the record is damaged.
+pub fn whole(
+    source: &StoredSource,
+    made_at: Timestamp,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<SourceScan, Failure> {
+    let facts = UploadFacts::from_volume(&source.volume).map_err(|error| broken_result(&error))?;
+    self::source((source, made_at), &facts, None, secret, limits)
+}
+
 /// The place of the volume's voxels.
 ///
 /// # Errors

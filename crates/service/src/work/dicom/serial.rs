@@ -1,7 +1,5 @@
 //! DICOM objects of a stored serial comparison: of the study of the last scan.
 
-use super::super::failures::broken_result;
-use super::super::upload::UploadFacts;
 use super::{scan, stored};
 use crate::base::records::Failure;
 use crate::items::StoredResult;
@@ -27,12 +25,7 @@ pub fn measurements(
     let text = stored::report_text(&bytes)?;
     let given = std::iter::once(&result.source).chain(&result.others);
     let given: Vec<SourceScan> = given
-        .map(|source| {
-            let facts =
-                UploadFacts::from_volume(&source.volume).map_err(|error| broken_result(&error))?;
-            // Gates are added up: the scan is all of them.
-            scan::source((source, result.made_at), &facts, None, secret, limits)
-        })
+        .map(|source| scan::whole(source, result.made_at, secret, limits))
         .collect::<Result<_, Failure>>()?;
     let shown: Option<Vec<Provenance>> = given.iter().map(|scan| scan.shown().cloned()).collect();
     // Objects that are freed of the identity say nothing of the headers.

@@ -165,10 +165,17 @@ impl<'a> DicomBeat<'a> {
             add(self.text.as_bytes());
         });
         let mut set = DataSet::new();
-        let mut groups = self.groups(&uids);
-        groups.extend((self.reading.iter()).flat_map(|reading| reading.groups(self.structure)));
-        let signature = self.reading.map(|reading| reading.signature(scans[0]));
-        sr::put(&scans, self.structure, groups, &[], signature, &mut set);
+        let signature = self
+            .reading
+            .map(|reading| reading.signature(self.structure, scans[0]));
+        sr::put(
+            &scans,
+            self.structure,
+            self.groups(&uids),
+            &[],
+            signature,
+            &mut set,
+        );
         let name = BeatObject::Measurements.file_name();
         put_facts(
             scans[0],

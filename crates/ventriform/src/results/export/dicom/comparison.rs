@@ -173,7 +173,9 @@ impl<'a> DicomComparison<'a> {
         self.check()?;
         let mut set = DataSet::new();
         let scans = self.scans.each_ref();
-        let signature = self.reading.map(|reading| reading.signature(scans[0]));
+        let signature = self
+            .reading
+            .map(|reading| reading.signature(self.structure, scans[0]));
         sr::put(
             &scans,
             self.structure,
@@ -325,7 +327,6 @@ impl<'a> DicomComparison<'a> {
                 groups.push(group("1501", content));
             }
         }
-        groups.extend((self.reading.iter()).flat_map(|reading| reading.groups(self.structure)));
         groups
     }
 

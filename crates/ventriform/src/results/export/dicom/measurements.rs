@@ -87,7 +87,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
         &[mask],
         results
             .reading
-            .map(|reading| reading.signature(results.scan)),
+            .map(|reading| reading.signature(results.structure, results.scan)),
         set,
     );
 }
@@ -122,7 +122,6 @@ fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
             .into_iter()
             .flat_map(|perfusion| normals::groups(perfusion, results.structure, &results.uids)),
     );
-    groups.extend((results.reading.iter()).flat_map(|reading| reading.groups(results.structure)));
     groups
 }
 

@@ -45,8 +45,8 @@ pub(super) fn uid(uids: &Uids, name: &str, reading: Option<SignedReading<'_>>) -
 }
 
 impl SignedReading<'_> {
-    /// Who verified the report, when, and what they say of the study.
-    pub(super) fn signature(&self, scan: &SourceScan) -> Signature {
+    /// The reader's scores, who verified the report and when, and what they say of the study.
+    pub(super) fn signature(&self, structure: Structure, scan: &SourceScan) -> Signature {
         let read_at = self.reading.read_at.chars();
         let digits: String = read_at.filter(char::is_ascii_digit).collect();
         let reader = match scan.shown() {
@@ -63,13 +63,14 @@ impl SignedReading<'_> {
             Vec::new(),
         );
         Signature {
+            groups: self.groups(structure),
             observer,
             evaluations: self.evaluations(scan),
         }
     }
 
     /// The groups of the reader's scores.
-    pub(super) fn groups(&self, structure: Structure) -> Vec<DataSet> {
+    fn groups(&self, structure: Structure) -> Vec<DataSet> {
         let scans = self.reading.scores.iter();
         scans
             .flat_map(|scores| self.groups_of(scores, structure))

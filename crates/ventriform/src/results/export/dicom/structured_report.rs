@@ -57,6 +57,8 @@ pub(super) struct SeriesReference {
 
 /// What a reader adds to a report.
 pub(super) struct Signature {
+    /// Measurement groups.
+    pub groups: Vec<DataSet>,
     /// The item of the Verifying Observer Sequence.
     pub observer: DataSet,
     /// The container of qualitative evaluations.
@@ -68,7 +70,7 @@ pub(super) struct Signature {
 pub(super) fn put(
     scans: &[&SourceScan],
     structure: Structure,
-    groups: Vec<DataSet>,
+    mut groups: Vec<DataSet>,
     others: &[SeriesReference],
     signature: Option<Signature>,
     set: &mut DataSet,
@@ -86,6 +88,7 @@ pub(super) fn put(
         set.text(tags::PRELIMINARY_FLAG, "FINAL");
         set.text(tags::VERIFICATION_FLAG, "VERIFIED");
         set.item(tags::VERIFYING_OBSERVER_SEQUENCE, signature.observer);
+        groups.extend(signature.groups);
         signature.evaluations
     });
     let mut own = Vec::new();
