@@ -1,19 +1,18 @@
-//! `ventriform phantom`: a simulated scan with its true mask.
+//! `ventriform phantom`: simulated scans with the true mask of the wall.
 
 use super::Bar;
 use super::output::{create_folder, note, write_file};
 use anyhow::Result;
 use clap::Args;
+use serde_json::json;
 use std::path::{Path, PathBuf};
-use ventriform::base::geometry::Vec3;
-use ventriform::base::geometry::frame::VoxelToPatient;
 use ventriform::base::progress::{CancelToken, Monitor};
+use ventriform::image::volume::Volume;
 use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::phantom::{
-    PerfusionDefect, PhantomParameters, healthy_person, phantom, phantom_projections,
+    PerfusionDefect, PhantomBeat, PhantomParameters, healthy_person, phantom, phantom_gates,
 };
-use ventriform::image::volume::{Provenance, Volume};
-use ventriform::results::export::dicom::{Moment, SourceScan, derived_uid, nuclear_projections};
+use ventriform::runs::examples::{SIMULATED_NOTE, simulated_projections, simulated_slices};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]
@@ -22,6 +21,10 @@ use ventriform::results::export::dicom::{Moment, SourceScan, derived_uid, nuclea
   ventriform phantom -o moved --motion 20
   ventriform phantom -o infarct --defect 3:1 --defect 9:1 --right-ventricle 1.2
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json
+  ventriform phantom -o gated --gates 8 --ejection-fraction 45
+writes the gates as gated/spect.nii.gz, with gated/lv_truth_ed.nii.gz and gated/lv_truth_es.nii.gz
+  ventriform phantom -o pair --pair --defect 7:0.6 --defect 13:0.6
+writes pair/stress and pair/rest, each with the files above: the defects are there at stress alone
   ventriform phantom -o raw --size 64 --spacing 6.4 --projections --motion 12
 writes also raw/raw.dcm, the projections of a gamma camera, for `segment`, `reconstruct` ...
   ventriform phantom -o healthy --normal --seed 5
@@ -39,10 +42,25 @@ pub struct PhantomArgs {
     /// Number of healthy hearts, with --normal [default: 30]
     #[arg(long, value_name = "N", requires = "normal", value_parser = clap::value_parser!(u32).range(1..=500))]
     cases: Option<u32>,
-    /// Voxels along each axis [default: 128, with --normal 64]
+    /// Gates of a heart that beats, 4 to 32
+    #[arg(long, value_name = "N", conflicts_with_all = ["normal", "projections"])]
+    gates: Option<u32>,
+    /// Ejection fraction, per cent, with --gates [default: 60]
+    #[arg(long, value_name = "PERCENT", requires = "gates")]
+    ejection_fraction: Option<f64>,
+    /// One heart at stress and at rest: defects (by default 7:0.6, 8:0.6, 13:0.6 and 14:0.6) are there at stress
+    #[arg(long, conflicts_with = "normal")]
+    pair: bool,
+    /// A defect at rest, as with --defect: what is as severe at stress is fixed (repeatable)
+    #[arg(long, value_name = "SEGMENT:SEVERITY", value_parser = parse_defect, requires = "pair")]
+    rest_defect: Vec<PerfusionDefect>,
+    /// Also write spect.dcm: the slices as a DICOM NM image, of a patient whose name says that it is simulated
+    #[arg(long, conflicts_with = "normal")]
+    dicom: bool,
+    /// Voxels along each axis [default: 128, with --normal or --gates 64]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
-    /// Distance between voxel centres, millimetres [default: 3.2, with --normal 6.4]
+    /// Distance between voxel centres, millimetres [default: 3.2, with --normal or --gates 6.4]
     #[arg(long, value_name = "MM")]
     spacing: Option<f64>,
     /// Counting noise: standard deviation divided by the mean in healthy wall; 0 for none
@@ -103,9 +121,10 @@ fn parse_defect(text: &str) -> Result<PerfusionDefect, String> {
 /// # Errors
 /// If a parameter is out of range or a file cannot be written.
 pub fn run(args: &PhantomArgs) -> Result<()> {
+    let coarse = args.normal || args.gates.is_some();
     let parameters = PhantomParameters {
-        shape: [args.size.unwrap_or(if args.normal { 64 } else { 128 }); 3],
-        spacing_mm: [args.spacing.unwrap_or(if args.normal { 6.4 } else { 3.2 }); 3],
+        shape: [args.size.unwrap_or(if coarse { 64 } else { 128 }); 3],
+        spacing_mm: [args.spacing.unwrap_or(if coarse { 6.4 } else { 3.2 }); 3],
         noise: args.noise,
         liver: args.liver,
         right_ventricle: args.right_ventricle,
@@ -118,55 +137,114 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     if args.normal {
         return healthy(args, &parameters);
     }
-    let bar = Bar::start();
-    let made = phantom(&parameters, &Monitor::new(&bar, CancelToken::new()));
-    bar.finish();
-    let made = made?;
-    create_folder(&args.output)?;
-    let at = |name: &str| args.output.join(name);
-    write_volume(&at("spect.nii.gz"), &made.volume, StoredType::Int16)?;
-    write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
-    let text = serde_json::to_string_pretty(&made.parameters)?;
-    write_file(&at("params.json"), text.as_bytes())?;
-    if args.projections {
-        write_file(&at("raw.dcm"), &raw(args, &parameters)?)?;
+    if !args.pair {
+        let names = scan(args, &args.output, &parameters, None)?;
+        note!("Written: {names} in {}", args.output.display());
+        return Ok(());
     }
-    note!(
-        "Written: spect.nii.gz, lv_truth.nii.gz{} and params.json in {}",
-        if args.projections { ", raw.dcm" } else { "" },
-        args.output.display()
-    );
+    let at_stress = match &parameters.defects[..] {
+        [] => DEFECTS_OF_A_PAIR.to_vec(),
+        given => given.to_vec(),
+    };
+    for (role, defects, number) in [
+        ("stress", at_stress, 0),
+        ("rest", args.rest_defect.clone(), 1),
+    ] {
+        let parameters = PhantomParameters {
+            defects,
+            scan: number,
+            ..parameters.clone()
+        };
+        let folder = args.output.join(role);
+        let names = scan(args, &folder, &parameters, Some(role))?;
+        note!("Written: {names} in {}", folder.display());
+    }
     Ok(())
 }
 
-/// The projections of the phantom as a DICOM file, of a patient of its own.
-fn raw(args: &PhantomArgs, parameters: &PhantomParameters) -> Result<Vec<u8>> {
-    let projections = phantom_projections(parameters, args.counts, &Monitor::silent())?;
-    let text = serde_json::to_string(parameters)?;
-    let made = Moment {
-        date: "20000101".into(),
-        time: "000000".into(),
-    };
-    let whose = Provenance {
-        patient_id: Some(format!("PHANTOM{}", args.seed)),
-        patient_name: Some("Phantom^Simulated".into()),
-        study_uid: Some(derived_uid(&[b"phantom", text.as_bytes()])),
-        ..Provenance::default()
-    };
-    let shape = projections.shape();
-    let frame = VoxelToPatient::centred(shape, [projections.pixel_mm; 3], Vec3::zeros())?;
-    let scan = SourceScan::new(whose, frame, shape, false, made);
-    let heads = usize::from(args.heads);
-    Ok(nuclear_projections(
-        &scan,
-        &projections,
-        heads,
-        PEOPLE_NOTE,
-    )?)
-}
+/// The defects at stress if none are given: the wall that the left anterior descending artery supplies.
+const DEFECTS_OF_A_PAIR: [PerfusionDefect; 4] = {
+    const fn of(segment: u8) -> PerfusionDefect {
+        PerfusionDefect {
+            segment,
+            severity: 0.6,
+        }
+    }
+    [of(7), of(8), of(13), of(14)]
+};
 
-/// The description of the simulated healthy people in their files.
-const PEOPLE_NOTE: &str = "simulated, not patients";
+/// Writes the scan of these parameters to a folder; the names of its files.
+fn scan(
+    args: &PhantomArgs,
+    folder: &Path,
+    parameters: &PhantomParameters,
+    role: Option<&str>,
+) -> Result<String> {
+    create_folder(folder)?;
+    let at = |name: &str| folder.join(name);
+    let bar = Bar::start();
+    let monitor = Monitor::new(&bar, CancelToken::new());
+    let mut facts = serde_json::to_value(parameters)?;
+    let mut names = vec!["spect.nii.gz"];
+    let (volumes, gate_ms) = match args.gates {
+        None => {
+            let made = phantom(parameters, &monitor);
+            bar.finish();
+            let made = made?;
+            write_volume(&at("spect.nii.gz"), &made.volume, StoredType::Int16)?;
+            write_volume(&at("lv_truth.nii.gz"), &made.truth, StoredType::Uint8)?;
+            names.push("lv_truth.nii.gz");
+            (vec![made.volume], None)
+        }
+        Some(gates) => {
+            let usual = PhantomBeat::default();
+            let beat = PhantomBeat {
+                gates,
+                ejection_fraction_percent: (args.ejection_fraction)
+                    .unwrap_or(usual.ejection_fraction_percent),
+                ..usual
+            };
+            let made = phantom_gates(parameters, &beat, &monitor);
+            bar.finish();
+            let made = made?;
+            let ends = made.ends();
+            for (name, gate) in ["lv_truth_ed.nii.gz", "lv_truth_es.nii.gz"]
+                .iter()
+                .zip(ends)
+            {
+                write_volume(&at(name), &made.gates[gate].truth, StoredType::Uint8)?;
+                names.push(name);
+            }
+            let [edv_ml, esv_ml] = ends.map(|gate| made.volumes_ml[gate]);
+            facts["beat"] = json!({
+                "gates": gates,
+                "rr_ms": beat.rr_ms,
+                "volumes_ml": made.volumes_ml,
+                "edv_ml": edv_ml,
+                "esv_ml": esv_ml,
+                "ejection_fraction_percent": 100.0 * (1.0 - esv_ml / edv_ml),
+            });
+            let volumes: Vec<Volume> = made.gates.into_iter().map(|gate| gate.volume).collect();
+            let bytes = nifti::write_gates(&volumes, Some(beat.gate_ms()), true)?;
+            write_file(&at("spect.nii.gz"), &bytes)?;
+            (volumes, Some(beat.gate_ms()))
+        }
+    };
+    let text = serde_json::to_string_pretty(&facts)?;
+    write_file(&at("params.json"), text.as_bytes())?;
+    if args.dicom {
+        let bytes = simulated_slices(parameters, &volumes, gate_ms, role)?;
+        write_file(&at("spect.dcm"), &bytes)?;
+        names.push("spect.dcm");
+    }
+    if args.projections {
+        let heads = usize::from(args.heads);
+        let bytes = simulated_projections(parameters, args.counts, heads, &Monitor::silent())?;
+        write_file(&at("raw.dcm"), &bytes)?;
+        names.push("raw.dcm");
+    }
+    Ok(format!("{} and params.json", names.join(", ")))
+}
 
 /// Healthy hearts of as many seeds as asked for, and the table of who they are.
 fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
@@ -184,7 +262,7 @@ fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
             StoredType::Int16,
         )?;
         let mut facts = serde_json::to_value(&made.parameters)?;
-        facts["people"] = PEOPLE_NOTE.into();
+        facts["people"] = SIMULATED_NOTE.into();
         write_file(
             &folder.join("params.json"),
             serde_json::to_string_pretty(&facts)?.as_bytes(),
@@ -194,7 +272,7 @@ fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
     }
     write_file(&args.output.join("cohort.csv"), table.as_bytes())?;
     note!(
-        "Written: {} healthy hearts ({PEOPLE_NOTE}) and cohort.csv in {}",
+        "Written: {} healthy hearts ({SIMULATED_NOTE}) and cohort.csv in {}",
         args.cases.unwrap_or(30),
         args.output.display()
     );

@@ -86,7 +86,13 @@ fn nuclear(made: &Reconstructed, how: &Reconstruction, at: Moment) -> Result<Vec
     let first = &made.volumes[0];
     let scan = SourceScan::new(whose, first.frame.clone(), first.shape, false, at);
     let derivation = format!("reconstructed by ventriform: {how}");
-    nuclear_image(&scan, &made.volumes, made.gate_ms, &derivation)
+    nuclear_image(
+        &scan,
+        &made.volumes,
+        made.gate_ms,
+        "reconstructed slices",
+        &derivation,
+    )
 }
 
 /// Size and number of the volumes.

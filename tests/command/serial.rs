@@ -47,7 +47,14 @@ fn of_one_study(volume: &Volume) -> Vec<u8> {
         time: "134500".into(),
     };
     let scan = SourceScan::new(whose, volume.frame.clone(), volume.shape, true, made);
-    nuclear_image(&scan, std::slice::from_ref(volume), None, "simulated").unwrap()
+    nuclear_image(
+        &scan,
+        std::slice::from_ref(volume),
+        None,
+        "slices",
+        "simulated",
+    )
+    .unwrap()
 }
 
 #[test]

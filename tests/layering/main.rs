@@ -103,6 +103,7 @@ const LIBRARY_ROOMS: &[&str] = &[
     "runs/reading",
     "runs/evaluate",
     "runs/objects",
+    "runs/examples",
     "runs/advice",
     "front",
 ];

@@ -1,5 +1,6 @@
 //! The stages in order, from files to results: a model ([`pipeline`]), a segmentation, a beat ([`gated`]), rest and
-//! stress, scans over the years ([`serial`]), what a reader states of a result ([`reading`]), cohorts ([`evaluate`]); the patient and scan that DICOM objects name ([`objects`]), and the advice for an error
+//! stress, scans over the years ([`serial`]), what a reader states of a result ([`reading`]), cohorts ([`evaluate`]); the
+//! patient and scan that DICOM objects name ([`objects`]), simulated scans ([`examples`]), and the advice for an error
 //! ([`advice`]).
 
 pub mod pipeline;
@@ -17,5 +18,7 @@ pub mod reading;
 pub mod evaluate;
 
 pub mod objects;
+
+pub mod examples;
 
 pub mod advice;

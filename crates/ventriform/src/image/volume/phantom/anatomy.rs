@@ -123,6 +123,14 @@ impl<'a> Anatomy<'a> {
         }
     }
 
+    /// The patient whose heart has shortened from that length; the apex lies where it lay.
+    pub(super) fn contracted(parameters: &'a PhantomParameters, relaxed_length_mm: f64) -> Self {
+        let mut anatomy = Self::new(parameters);
+        let to_base = anatomy.to_heart.row(2).transpose();
+        anatomy.centre -= (relaxed_length_mm - parameters.length_mm) / 2.0 * to_base;
+        anatomy
+    }
+
     /// Position and orientation of the LV.
     pub(super) fn pose(&self) -> HeartPose {
         let row = |r: usize| self.to_heart.row(r).transpose();

@@ -12,11 +12,13 @@
 //! 5. A second Gaussian blur: the reconstruction filter, which correlates the noise.
 //!
 //! Steps 2 to 5 replace projection and reconstruction. Resolution and texture of the noise are
-//! realistic; attenuation and scatter are not modelled. [`phantom_projections`] makes the projections themselves.
+//! realistic; attenuation and scatter are not modelled. [`phantom_projections`] makes the projections themselves,
+//! [`phantom_gates`] the gates of a heart that beats.
 //!
 //! Guaranteed: the same parameters give the same voxels on any number of threads.
 
 mod anatomy;
+mod beat;
 mod healthy;
 mod motion;
 mod parameters;
@@ -24,6 +26,7 @@ mod poisson;
 mod views;
 
 pub use anatomy::HeartPose;
+pub use beat::{GatedPhantom, PhantomBeat, phantom_gates};
 pub use healthy::{HealthyPerson, healthy_person};
 pub use parameters::{PerfusionDefect, PhantomError, PhantomParameters, UptakeVariation};
 pub use views::phantom_projections;
@@ -56,8 +59,17 @@ pub struct Phantom {
 /// [`PhantomError`] if a parameter is out of range, the heart does not fit into the volume, or the
 /// work was cancelled.
 pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phantom, PhantomError> {
-    let p = parameters;
-    let (anatomy, frame) = placed(p)?;
+    parameters.check()?;
+    imaged(parameters, &Anatomy::new(parameters), monitor)
+}
+
+/// The image of the patient `anatomy` of checked parameters.
+fn imaged(
+    p: &PhantomParameters,
+    anatomy: &Anatomy<'_>,
+    monitor: &Monitor,
+) -> Result<Phantom, PhantomError> {
+    let frame = frame_about(p, anatomy)?;
     let step = |fraction| monitor.report(Stage::Read, fraction);
     step(0.0)?;
     let (mut voxels, wall) = anatomy.render(p.shape, &frame, monitor)?;
@@ -71,7 +83,7 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
     if p.noise > 0.0 {
         let gain: f64 = filter.iter().map(Kernel::noise_gain).product();
         let counts = gain / p.noise.powi(2);
-        count(&mut voxels, p.shape, counts, p.seed, monitor)?;
+        count(&mut voxels, p.shape, counts, p.noise_seed(), monitor)?;
     }
     step(0.8)?;
     blur(&mut voxels, p.shape, &filter, monitor)?;
@@ -101,10 +113,19 @@ pub fn phantom(parameters: &PhantomParameters, monitor: &Monitor) -> Result<Phan
 fn placed(p: &PhantomParameters) -> Result<(Anatomy<'_>, VoxelToPatient), PhantomError> {
     p.check()?;
     let anatomy = Anatomy::new(p);
+    let frame = frame_about(p, &anatomy)?;
+    Ok((anatomy, frame))
+}
+
+/// The grid about the heart.
+fn frame_about(
+    p: &PhantomParameters,
+    anatomy: &Anatomy<'_>,
+) -> Result<VoxelToPatient, PhantomError> {
     let frame = VoxelToPatient::centred(p.shape, p.spacing_mm, anatomy::FIELD_CENTRE)
         .expect("the spacing was checked to be positive");
     anatomy.check_fits(p)?;
-    Ok((anatomy, frame))
+    Ok(frame)
 }
 
 /// The kernels of the resolution of camera and collimator.

@@ -61,6 +61,8 @@ pub struct PhantomParameters {
     pub wall_value: f64,
     /// Seed of the random numbers for pose and noise. Default 1.
     pub seed: u64,
+    /// Which scan of the patient it is: each has its own noise. Default 0.
+    pub scan: u32,
 }
 
 /// How the uptake of a wall differs from place to place, as that of healthy people does: attenuation lowers it
@@ -134,6 +136,7 @@ impl Default for PhantomParameters {
             noise: 0.05,
             wall_value: 1000.0,
             seed: 1,
+            scan: 0,
         }
     }
 }
@@ -172,6 +175,14 @@ pub enum PhantomError {
 }
 
 impl PhantomParameters {
+    /// The seed of the noise of this scan.
+    pub(super) fn noise_seed(&self) -> u64 {
+        // An odd number, so that no two scans of a patient have the same one.
+        const NEXT_SCAN: u64 = 0x9E37_79B9_7F4A_7C15;
+        let skipped = NEXT_SCAN.wrapping_mul(u64::from(self.scan));
+        self.seed.wrapping_add(skipped)
+    }
+
     /// Checks every parameter's range.
     pub(super) fn check(&self) -> Result<(), PhantomError> {
         for n in self.shape {
@@ -229,7 +240,13 @@ impl PhantomParameters {
     }
 }
 
-fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), PhantomError> {
+/// Checks that the value of a field lies in its range.
+pub(super) fn within(
+    field: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+) -> Result<(), PhantomError> {
     if (low..=high).contains(&value) {
         Ok(())
     } else {

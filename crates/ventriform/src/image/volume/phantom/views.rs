@@ -52,7 +52,7 @@ pub fn phantom_projections(
     monitor.check()?;
     let sum: f64 = projections.counts.iter().map(|v| f64::from(*v)).sum();
     let per_value = 1e6 * counts_m / sum.max(f64::MIN_POSITIVE);
-    let mut random = stream(p.seed, Purpose::PhantomNoise);
+    let mut random = stream(p.noise_seed(), Purpose::PhantomNoise);
     for count in &mut projections.counts {
         *count = poisson::draw(per_value * f64::from(*count), &mut random) as f32;
     }

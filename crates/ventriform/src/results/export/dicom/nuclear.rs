@@ -17,8 +17,8 @@ use ventriform_dicom::{tags, uids};
 /// Greatest pixel.
 const MOST: f32 = 65_535.0;
 
-/// `volumes`, the only one or those of all gates, each `gate_ms` long, as a file of `scan`; `derivation` says how they
-/// were made.
+/// `volumes`, the only one or those of all gates, each `gate_ms` long, as a file of `scan`, whose series is described so;
+/// `derivation` says how they were made.
 ///
 /// # Errors
 /// [`DicomError`], also for a grid whose axes are not at right angles or whose slices do not follow their normal.
@@ -26,6 +26,7 @@ pub fn nuclear_image(
     scan: &SourceScan,
     volumes: &[Volume],
     gate_ms: Option<f64>,
+    description: &str,
     derivation: &str,
 ) -> Result<Vec<u8>, DicomError> {
     scan.check()?;
@@ -52,6 +53,7 @@ pub fn nuclear_image(
     let names = Uids::over_all(|add| {
         add(env!("CARGO_PKG_VERSION").as_bytes());
         scan.add_to(add);
+        add(description.as_bytes());
         add(derivation.as_bytes());
         add(&pixels);
     });
@@ -115,12 +117,8 @@ pub fn nuclear_image(
     set.shorts(tags::SLICE_VECTOR, &slice_vector);
     set.item(tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE, mapping(per_pixel));
     put_pixels(&mut set, [columns, rows], pixels);
-    let facts = ObjectFacts {
-        description: "reconstructed slices",
-        ..FACTS
-    };
     let instance = [names.uid("image"), names.uid("series of the image")];
-    put_facts(scan, &facts, instance, facts.description.into(), &mut set);
+    put_facts(scan, &FACTS, instance, description.into(), &mut set);
     Ok(set.file()?)
 }
 
