@@ -170,6 +170,7 @@ fn public(settings: &Settings) -> Router<App> {
         .route("/docs", get(front_page::documentation))
         .route("/docs/", get(front_page::documentation))
         .route("/assets/{version}/{name}", get(front_page::asset))
+        .route("/examples/{name}", get(front_page::example))
         .route("/favicon.ico", get(front_page::icon))
 }
 

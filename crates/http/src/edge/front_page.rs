@@ -1,4 +1,5 @@
-//! `GET /`: the page for browsers, a few commands for curl. `/docs`, `/assets/*`: the rest of the page.
+//! `GET /`: the page for browsers, a few commands for curl. `/docs`, `/assets/*`: the rest of the page. `/examples/*`:
+//! simulated scans that the page offers to those who have none at hand; each is made when it is asked for first.
 //!
 //! The page is built from `web/` and committed as `web/dist`, under names that stay the same. It is served under
 //! `/assets/VERSION/`, where the version is a hash of all its files, so browsers keep them for ever, and never mix
@@ -11,6 +12,7 @@
 
 use crate::wire::negotiate;
 use crate::wire::packed::PackedFile;
+use crate::wire::problem::Problem;
 use crate::wire::problem::not_found::no_such_path;
 use crate::wire::public_base::PublicBase;
 use axum::extract::Path;
@@ -20,6 +22,9 @@ use include_dir::{Dir, include_dir};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
+use tokio::sync::OnceCell;
+use ventriform::base::progress::Monitor;
+use ventriform::runs::examples::Example;
 use ventriform_service::base::records::hex;
 
 static PAGE_FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
@@ -145,6 +150,35 @@ pub async fn asset(Path((version, name)): Path<(String, String)>, headers: Heade
     match PAGE.assets.get(&*name).filter(|_| version == PAGE.version) {
         Some(file) => with_policy(file.answer(&headers)),
         None => no_such_path().await.into_response(),
+    }
+}
+
+/// The media type of the examples.
+const DICOM_MEDIA_TYPE: &str = "application/dicom";
+
+/// The files of the examples that were asked for, in the order of [`Example::ALL`].
+static EXAMPLES: [OnceCell<PackedFile>; Example::ALL.len()] =
+    [const { OnceCell::const_new() }; Example::ALL.len()];
+
+/// A simulated scan as a DICOM file.
+pub async fn example(Path(name): Path<String>, headers: HeaderMap) -> Response {
+    let mut known = Example::ALL.into_iter().zip(&EXAMPLES);
+    let Some((example, cell)) = known.find(|(example, _)| example.file_name() == name) else {
+        return no_such_path().await.into_response();
+    };
+    let made = cell.get_or_try_init(|| async {
+        let simulated = tokio::task::spawn_blocking(move || {
+            let file = example.file(&Monitor::silent());
+            let packed = |bytes: Vec<u8>| {
+                PackedFile::new(bytes, DICOM_MEDIA_TYPE, REVALIDATED_CACHE_CONTROL)
+            };
+            file.map(packed).map_err(|error| error.to_string())
+        });
+        simulated.await.map_err(|error| error.to_string())?
+    });
+    match made.await {
+        Ok(file) => file.answer(&headers),
+        Err(error) => Problem::internal(&error).into_response(),
     }
 }
 

@@ -108,6 +108,7 @@ fn is_open_path(path: &str, settings: &Settings) -> bool {
         path,
         "/" | "/healthz" | "/readyz" | "/openapi.json" | "/docs" | "/docs/" | "/favicon.ico"
     ) || path.starts_with("/assets/")
+        || path.starts_with("/examples/")
         || (settings.open_metrics && path == "/metrics")
 }
 
@@ -394,6 +395,7 @@ mod tests {
             "/openapi.json",
             "/docs",
             "/assets/page.js",
+            "/examples/scan.dcm",
         ] {
             assert!(is_open_path(open, &settings), "{open}");
         }
