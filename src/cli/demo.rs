@@ -1,19 +1,21 @@
-//! `ventriform demo`: starts the service, and uses it over HTTP to make a model of a simulated scan.
+//! `ventriform demo`: starts the service, and uses it over HTTP: three simulated patients, a fit, beats, and a comparison
+//! of stress and rest.
 
 use super::output::{create_folder, say, write_file};
 use super::{Bar, serve};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use reqwest::Client;
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use ventriform::base::progress::Monitor;
-use ventriform::image::volume::nifti::{self, StoredType};
-use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::runs::examples::Example;
 
-/// Start the service here, send it a simulated scan, and fetch the model
+/// Start the service here, send it simulated scans, and fetch the answers
 #[derive(Debug, Args)]
 pub struct DemoArgs {
     /// Address and port to listen on; port 0 takes any free one
@@ -22,15 +24,15 @@ pub struct DemoArgs {
     /// Data folder of the service [default: a temporary folder, deleted when the demo ends]
     #[arg(long, value_name = "DIR")]
     data_dir: Option<PathBuf>,
-    /// Folder for lv.glb and report.html
+    /// Folder for lv.glb, segmentation.html, beat.html and comparison.html
     #[arg(long, value_name = "DIR", default_value = ".")]
     output: PathBuf,
-    /// Number of points of the model
-    #[arg(long, value_name = "N", default_value_t = 150)]
-    points: u32,
-    /// End after the job instead of serving until Ctrl-C
+    /// End after the jobs instead of serving until Ctrl-C
     #[arg(long)]
     exit: bool,
+    /// Do not open the comparison in a browser
+    #[arg(long)]
+    no_browser: bool,
 }
 
 /// A client of the service.
@@ -54,14 +56,33 @@ impl Remote {
         format!("{}{path}", self.base)
     }
 
-    /// Uploads the volume and files a job; returns the job as JSON.
-    async fn submit(&self, volume: Vec<u8>, points: u32) -> Result<Value> {
+    /// Stores a scan; its id.
+    async fn upload(&self, name: &str, scan: Vec<u8>) -> Result<String> {
         let request = self
             .client
-            .post(self.url(&format!("/v1/models?points={points}")))
-            .header("content-type", "application/gzip")
-            .body(volume);
-        Ok(checked(request.send().await?).await?.json().await?)
+            .post(self.url("/v1/volumes"))
+            .query(&[("labels", format!("name:{name}"))])
+            .header("content-type", "application/dicom")
+            .body(scan);
+        let volume: Value = checked(request.send().await?).await?.json().await?;
+        let id = volume["id"].as_str();
+        Ok(id
+            .context("the answer of the service names no volume")?
+            .to_owned())
+    }
+
+    /// Files a job and shows its progress until it ends; the path of its result.
+    async fn result(&self, path: &str, order: Value) -> Result<String> {
+        let request = self.client.post(self.url(path)).json(&order);
+        let job: Value = checked(request.send().await?).await?.json().await?;
+        let own = (job["links"]["self"].as_str())
+            .context("the answer of the service has no link to the job")?;
+        let done = self.follow(own).await?;
+        let kind = done["kind"].as_str().unwrap_or_default();
+        let made = done["links"][kind].as_str();
+        Ok(made
+            .context("the finished job has no link to its result")?
+            .to_owned())
     }
 
     /// Shows the progress of the job until it ends; returns the finished job.
@@ -97,7 +118,7 @@ async fn checked(answer: reqwest::Response) -> Result<reqwest::Response> {
 /// Runs the demo.
 ///
 /// # Errors
-/// If the address is in use, a folder cannot be written, or the job fails.
+/// If the address is in use, a folder cannot be written, or a job fails.
 pub fn run(args: &DemoArgs) -> Result<()> {
     let runtime =
         tokio::runtime::Runtime::new().context("cannot start the threads of the service")?;
@@ -114,93 +135,91 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
         base: format!("http://{}", service.address()),
     };
     say!("The service listens on {}", remote.base);
+    say!("Sending four simulated scans of three patients ...");
+    let [scan, gated, stress, rest] = stored(&remote).await?;
 
-    let volume = tokio::task::spawn_blocking(simulated_scan).await??;
-    say!(
-        "Sending a simulated scan (128³ voxels of 3.2 mm, {} KiB) ...",
-        volume.len() / 1024
-    );
-    let job = remote.submit(volume, args.points).await?;
-    let path = job["links"]["self"]
-        .as_str()
-        .context("the answer of the service has no link to the job")?
-        .to_owned();
-    let done = remote.follow(&path).await?;
-    let model = done["links"]["model"]
-        .as_str()
-        .context("the finished job has no link to its model")?;
+    let of = |volume: &str| json!({"volume": volume});
+    let fit = json!({"volume": scan, "kind": "segmentation"});
+    let fit = remote.result("/v1/jobs", fit).await?;
+    let mut beats = Vec::new();
+    for volume in [&gated, &stress, &rest] {
+        let mut order = of(volume);
+        order["kind"] = "beat".into();
+        beats.push(remote.result("/v1/jobs", order).await?);
+    }
+    let pair = json!({"stress": stress, "rest": rest});
+    let pair = remote.result("/v1/comparisons", pair).await?;
 
     create_folder(&args.output)?;
-    for (remote_name, file) in [("mesh.glb", "lv.glb"), ("report.html", "report.html")] {
-        let bytes = remote.bytes(&format!("{model}/{remote_name}")).await?;
-        write_file(&args.output.join(file), &bytes)?;
+    let files = [
+        (format!("{fit}/mesh.glb"), "lv.glb"),
+        (format!("{fit}/report.html"), "segmentation.html"),
+        (format!("{}/report.html", beats[0]), "beat.html"),
+        (format!("{pair}/report.html"), "comparison.html"),
+    ];
+    for (path, file) in &files {
+        write_file(&args.output.join(file), &remote.bytes(path).await?)?;
     }
-    print_figures(&remote.json(&format!("{model}/report")).await?);
+    say!("");
+    for (title, path) in [
+        ("One scan", &fit),
+        ("Gated", &beats[0]),
+        ("Stress and rest", &pair),
+    ] {
+        let report = remote.json(&format!("{path}/report")).await?;
+        say!("{title}: {}", sentences(&report));
+    }
+    let names: Vec<&str> = files.iter().map(|(_, file)| *file).collect();
     say!(
-        "\nWritten: {} and {}",
-        args.output.join("lv.glb").display(),
-        args.output.join("report.html").display()
+        "\nWritten: {} in {}",
+        names.join(", "),
+        args.output.display()
     );
     if args.exit {
-        service.stop().await?;
-        return Ok(());
+        return Ok(service.stop().await?);
     }
-    print_next_steps(&remote.base, model);
+    let id = pair.rsplit('/').next().unwrap_or_default();
+    let page = format!("{}/#/comparison/{id}", remote.base);
+    say!("Stress and rest beside each other: {page}\nServing until Ctrl-C.");
+    if !args.no_browser && std::io::stdout().is_terminal() {
+        open_in_browser(&page);
+    }
     tokio::signal::ctrl_c().await?;
-    service.stop().await?;
-    Ok(())
+    Ok(service.stop().await?)
 }
 
-/// A phantom with the default parameters, as the bytes of a .nii.gz file.
-fn simulated_scan() -> Result<Vec<u8>> {
-    let made = phantom(&PhantomParameters::default(), &Monitor::silent())?;
-    Ok(nifti::write(&made.volume, StoredType::Int16, true)?)
+/// Simulates and stores the examples, in their order; their ids.
+async fn stored(remote: &Remote) -> Result<[String; 4]> {
+    let mut ids = [const { String::new() }; Example::ALL.len()];
+    for (id, example) in ids.iter_mut().zip(Example::ALL) {
+        let file = tokio::task::spawn_blocking(move || example.file(&Monitor::silent()));
+        *id = remote.upload(&example.file_name(), file.await??).await?;
+    }
+    Ok(ids)
 }
 
-fn print_figures(report: &Value) {
-    let figure = |section: &str, key: &str| report[section][key].as_f64().unwrap_or(f64::NAN);
-    let ratio = &report["shape"]["radius_ratio"];
-    say!("\nThe model");
-    say!(
-        "  {} points, {} triangles, Euler characteristic {}, {} self-intersections",
-        report["mesh"]["vertices"],
-        report["mesh"]["triangles"],
-        report["mesh"]["euler_characteristic"],
-        report["mesh"]["self_intersections"]
-    );
-    say!(
-        "  fitness {:.3} after re-tiling, {:.3} optimised ({:+.1} %)",
-        figure("fitness", "retiled"),
-        figure("fitness", "optimised"),
-        figure("fitness", "gain_percent")
-    );
-    say!(
-        "  triangle shape 2r/R {:.3} mean, {:.3} least (1 = equilateral)",
-        ratio["mean"].as_f64().unwrap_or(f64::NAN),
-        ratio["min"].as_f64().unwrap_or(f64::NAN)
-    );
-    say!(
-        "  {:.2} mm mean and {:.2} mm largest distance to the surface",
-        figure("distance", "mean_mm"),
-        figure("distance", "hausdorff_mm")
-    );
-    say!(
-        "  took {:.0} ms on this machine",
-        figure("timings_ms", "total")
-    );
+/// What a report offers for the impression, as a paragraph.
+fn sentences(report: &Value) -> String {
+    let offered = report["impression"].as_array().into_iter().flatten();
+    let offered: Vec<&str> = offered.filter_map(Value::as_str).collect();
+    offered.join(" ")
 }
 
-fn print_next_steps(base: &str, model: &str) {
-    say!(
-        "\nServing until Ctrl-C. In another terminal:
-  curl {base}/
-  curl -s {base}{model}/report
-  curl -s -H 'Accept: model/stl' {base}{model}/mesh -o lv.stl
-  ventriform phantom -o phantom --seed 7
-  curl -fsS --data-binary @phantom/spect.nii.gz -H 'Prefer: wait=60' \\
-       -H 'Accept: model/gltf-binary' '{base}/v1/models?points=200' -o lv200.glb
-In a browser: {base}/ and {base}/docs"
-    );
+/// Shows an address where there is a screen; the address was printed, so it does not matter if that fails.
+fn open_in_browser(address: &str) {
+    let opener = if cfg!(target_os = "macos") {
+        "open"
+    } else if ["DISPLAY", "WAYLAND_DISPLAY"]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some())
+    {
+        "xdg-open"
+    } else {
+        return;
+    };
+    let mut command = Command::new(opener);
+    command.arg(address).stdin(Stdio::null());
+    let _ = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
 }
 
 /// The data folder of the service; a temporary one is deleted at the end.
