@@ -177,6 +177,7 @@ fn value_name(kind: &Kind) -> &'static str {
         Kind::Integers { count: 3 } => "I,J,K",
         Kind::Integers { .. } => "I0,J0,K0,I1,J1,K1",
         Kind::Numbers { .. } => "X,Y,Z",
+        Kind::Points { .. } => "X,Y,Z[,X,Y,Z...]",
         Kind::Text { .. } => "TEXT",
         Kind::Stored { .. } => "ID",
     }

@@ -178,6 +178,10 @@ fn rows<'py, P: Parameters>(
                 row.set_item("kind", "numbers")?;
                 row.set_item("count", count)?;
             }
+            Kind::Points { most } => {
+                row.set_item("kind", "points")?;
+                row.set_item("most", most)?;
+            }
             Kind::Text { example, .. } => {
                 row.set_item("kind", "text")?;
                 row.set_item("example", example)?;

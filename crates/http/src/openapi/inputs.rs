@@ -49,7 +49,7 @@ fn parameter_of<P: Parameters>(spec: &ParameterSpec<P>) -> Parameter {
         .required(Required::False)
         .description(Some(spec.summary))
         .schema(Some(schema_of(spec)));
-    if let Kind::Integers { .. } | Kind::Numbers { .. } = spec.kind {
+    if let Kind::Integers { .. } | Kind::Numbers { .. } | Kind::Points { .. } = spec.kind {
         // One value `1,2,3`, not the parameter repeated.
         parameter = parameter
             .style(Some(ParameterStyle::Form))

@@ -80,6 +80,8 @@ impl BesideFit for BeatChoice {
         ("mesh_frame", NO_EXPERT),
         ("reader", "readers draw one wall, not a beat"),
         ("edge", "a beat has the anatomical wall"),
+        ("inner_through", "the gates follow the image"),
+        ("outer_through", "the gates follow the image"),
         ("organ", "only the left ventricle has a beat"),
         ("mask_grid", "labels lie on the gates' grid"),
     ];

@@ -1,11 +1,13 @@
 //! The parameters of a comparison: its own, and those of the fits to both scans.
 
-use super::fit_specs::{NAME_PATTERN, direction, point, scan_name};
+use super::fit_specs::{NAME_PATTERN, direction, point, scan_name, through_points};
 use super::table::titled;
 use super::with_fit::{BesideFit, WithFit};
 use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters, groups};
 use crate::base::geometry::Vec3;
 use crate::heart::comparison::WhichScan;
+use crate::heart::deform::ThroughPoint;
+use crate::heart::deform::through::MOST_THROUGH_POINTS;
 use serde_json::{Map, Value, json};
 
 /// The parameters of a comparison beside those of the fits to both scans.
@@ -29,7 +31,7 @@ pub struct ComparisonChoice {
 }
 
 /// A user's correction of the fit to one scan. All places are in its frame, LPS mm.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Correction {
     /// A point in the cavity.
     pub center: Option<Vec3>,
@@ -39,11 +41,20 @@ pub struct Correction {
     pub base: Option<Vec3>,
     /// Direction from the long axis to the wall that segments are counted from as the anterior one.
     pub segments_from: Option<Vec3>,
+    /// Points that the wall's surface passes through.
+    pub through: Vec<ThroughPoint>,
 }
 
 impl Correction {
     /// The parameters of a fit that a correction states, by their names in its table.
-    const CORRECTED_PARAMETERS: [&str; 4] = ["center", "axis", "base", "segments_from"];
+    const CORRECTED_PARAMETERS: [&str; 6] = [
+        "center",
+        "axis",
+        "base",
+        "segments_from",
+        "inner_through",
+        "outer_through",
+    ];
 
     /// Puts the correction into the parameters of the fit to its scan.
     pub fn correct(&self, parameters: &mut FitParameters) {
@@ -52,6 +63,7 @@ impl Correction {
         position.axis = self.axis.or(position.axis);
         parameters.deform.base = self.base.or(parameters.deform.base);
         parameters.segments_from = self.segments_from.or(parameters.segments_from);
+        parameters.deform.through.extend_from_slice(&self.through);
     }
 }
 
@@ -241,6 +253,20 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
          Default: the anterior wall"
         ),
     ),
+    through_points!(
+        "stress_inner_through",
+        "Inner surface through, at stress",
+        stress_correction.through,
+        false,
+        "Points that the wall's inner surface passes through in the scan at stress, x,y,z in LPS millimetres"
+    ),
+    through_points!(
+        "stress_outer_through",
+        "Outer surface through, at stress",
+        stress_correction.through,
+        true,
+        "Points that the wall's outer surface passes through in the scan at stress"
+    ),
     titled(
         "Centre at rest",
         in_scan!(
@@ -285,6 +311,20 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
          Default: the anterior wall"
         ),
     ),
+    through_points!(
+        "rest_inner_through",
+        "Inner surface through, at rest",
+        rest_correction.through,
+        false,
+        "Points that the wall's inner surface passes through in the scan at rest, x,y,z in LPS millimetres"
+    ),
+    through_points!(
+        "rest_outer_through",
+        "Outer surface through, at rest",
+        rest_correction.through,
+        true,
+        "Points that the wall's outer surface passes through in the scan at rest"
+    ),
 ];
 
 const NO_EXPERT: &str = "a comparison has no expert's mask";
@@ -309,6 +349,8 @@ impl BesideFit for ComparisonChoice {
         ("axis", ONE_SCAN),
         ("base", ONE_SCAN),
         ("segments_from", ONE_SCAN),
+        ("inner_through", ONE_SCAN),
+        ("outer_through", ONE_SCAN),
         (
             "protocol",
             "each scan has its own: `stress_protocol`, `rest_protocol`",
@@ -350,6 +392,8 @@ mod tests {
             ("axis", "0,0,2"),
             ("base", "0,-1,2.5"),
             ("segments_from", "0,1,0"),
+            ("inner_through", "1,2,3,4,5,6"),
+            ("outer_through", "7,8,9"),
         ];
         let fit = FitParameters::from_pairs(corrected).unwrap();
         for scan in WhichScan::ALL {

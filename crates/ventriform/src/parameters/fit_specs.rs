@@ -7,7 +7,8 @@ use super::{
 };
 use crate::base::geometry::Vec3;
 use crate::heart::deform::sensors::SensorKind;
-use crate::heart::deform::{Orbit, WallEdge};
+use crate::heart::deform::through::MOST_THROUGH_POINTS;
+use crate::heart::deform::{Orbit, ThroughPoint, WallEdge};
 use crate::heart::model::Organ;
 use crate::heart::normals::{Sex, yes_or_no};
 use crate::heart::polar::Projection;
@@ -29,6 +30,41 @@ impl Parameters for FitParameters {
         Self::settle(parameters)
     }
 }
+
+/// Points of one side of the wall: name, title, field of all points, whether it is the outer side, summary.
+macro_rules! through_points {
+    ($name:literal, $title:literal, $($field:ident).+, $outer:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            title: $title,
+            group: groups::PLACE,
+            unit: "mm",
+            kind: Kind::Points {
+                most: MOST_THROUGH_POINTS,
+            },
+            default: "",
+            summary: $summary,
+            read: |d, v| {
+                d.$($field).+.retain(|point| point.outer != $outer);
+                let points = v.numbers().chunks_exact(3).map(|place| ThroughPoint {
+                    outer: $outer,
+                    place: point(place),
+                });
+                d.$($field).+.extend(points);
+                Ok(())
+            },
+            write: |p| {
+                let own = p.$($field).+.iter().filter(|point| point.outer == $outer);
+                let numbers: Vec<f64> = own.flat_map(|point| <[f64; 3]>::from(point.place)).collect();
+                match numbers.is_empty() {
+                    true => Value::Null,
+                    false => json!(numbers),
+                }
+            },
+        }
+    };
+}
+pub(super) use through_points;
 
 /// A name of the scan's kind, as a table of healthy people has it.
 macro_rules! scan_name {
@@ -475,6 +511,21 @@ const OF_FIT: &[ParameterSpec<FitParameters>] = &[
         },
         write: |p| json!(p.deform.base.map(|b| [b.x, b.y, b.z])),
     },
+    through_points!(
+        "inner_through",
+        "Inner surface through",
+        deform.through,
+        false,
+        "Points that the wall's inner surface, as it looks in the image, passes through: x,y,z in LPS millimetres, one \
+         point after the other. About each, the image's own edge is not followed"
+    ),
+    through_points!(
+        "outer_through",
+        "Outer surface through",
+        deform.through,
+        true,
+        "Points that the wall's outer surface passes through, likewise"
+    ),
     choice!(
         "sensor",
         deform.sensor,

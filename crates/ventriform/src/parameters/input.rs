@@ -147,6 +147,17 @@ impl RawValue<'_> {
                 Some(list) => Err(format!("expected {count} numbers, got {}", list.len())),
                 None => Err(format!("{self} is not a list of finite numbers")),
             },
+            Kind::Points { most } => match self.as_numbers() {
+                Some(list) if list.is_empty() || list.len() % 3 != 0 => Err(format!(
+                    "expected three numbers for each point, got {}",
+                    list.len()
+                )),
+                Some(list) if list.len() > 3 * most => {
+                    Err(format!("{} points, at most {most}", list.len() / 3))
+                }
+                Some(list) => Ok(Checked::Numbers(list)),
+                None => Err(format!("{self} is not a list of finite numbers")),
+            },
             Kind::Stored {
                 prefixes,
                 word,

@@ -31,6 +31,11 @@ pub enum Kind {
         /// Their number.
         count: usize,
     },
+    /// Points: finite numbers separated by commas, three for each (in JSON also an array).
+    Points {
+        /// Most points.
+        most: usize,
+    },
     /// One of the listed words, or three finite numbers separated by commas (in JSON also an array).
     Direction(&'static [&'static str]),
     /// Text in a form of its own.

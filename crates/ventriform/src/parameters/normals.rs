@@ -60,6 +60,8 @@ impl BesideFit for NormalsChoice {
         ("protocol", STATED_BY_TABLE),
         ("tracer", STATED_BY_TABLE),
         ("attenuation_corrected", STATED_BY_TABLE),
+        ("inner_through", EACH_SCAN),
+        ("outer_through", EACH_SCAN),
         ("organ", "only left ventricles have normal limits"),
         ("mask_grid", "limits have no masks"),
         ("center", EACH_SCAN),

@@ -163,8 +163,9 @@ pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
                 .examples([spec.default, "0,0,1"])
                 .into()
         }
-        Kind::Integers { count } => list_of(Type::Integer, count, spec),
-        Kind::Numbers { count } => list_of(Type::Number, count, spec),
+        Kind::Integers { count } => list_of(Type::Integer, [count; 2], spec),
+        Kind::Numbers { count } => list_of(Type::Number, [count; 2], spec),
+        Kind::Points { most } => list_of(Type::Number, [3, 3 * most], spec),
         Kind::Stored {
             prefixes,
             word,
@@ -200,14 +201,18 @@ fn form_facts<P: Parameters>(spec: &ParameterSpec<P>) -> Extensions {
         .build()
 }
 
-fn list_of<P: Parameters>(kind: Type, count: usize, spec: &ParameterSpec<P>) -> Schema {
+fn list_of<P: Parameters>(
+    kind: Type,
+    [least, most]: [usize; 2],
+    spec: &ParameterSpec<P>,
+) -> Schema {
     Schema::Array(
         ArrayBuilder::new()
             .description(Some(spec.summary))
             .extensions(Some(form_facts(spec)))
             .items(Object::with_type(kind))
-            .min_items(Some(count))
-            .max_items(Some(count))
+            .min_items(Some(least))
+            .max_items(Some(most))
             .build(),
     )
 }

@@ -97,6 +97,8 @@ impl BesideFit for SerialChoice {
         ("mesh_unit", NO_EXPERT),
         ("mesh_frame", NO_EXPERT),
         ("reader", "a serial comparison draws no wall"),
+        ("inner_through", EACH_SCAN),
+        ("outer_through", EACH_SCAN),
         ("organ", "only left ventricles are compared"),
         ("mask_grid", "a serial comparison has no masks"),
         ("center", EACH_SCAN),

@@ -292,6 +292,9 @@ impl<P: Parameters> ParameterSpec<P> {
             }
             Kind::Integers { count } => format!("{count} whole numbers separated by commas"),
             Kind::Numbers { count } => format!("{count} finite numbers separated by commas"),
+            Kind::Points { most } => {
+                format!("1 to {most} points as finite numbers separated by commas, 3 for each")
+            }
             Kind::Text { example, .. } => format!("for example {example}"),
             Kind::Stored {
                 prefixes, word: "", ..

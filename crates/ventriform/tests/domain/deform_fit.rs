@@ -5,12 +5,13 @@
 
 use nalgebra::Rotation3;
 use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::bvh::Bvh;
 use ventriform::base::geometry::frame::VoxelToPatient;
 use ventriform::base::progress::{CancelToken, Monitor, Silent};
 use ventriform::heart::deform::dynamics::{self, Motion, StopReason};
 use ventriform::heart::deform::elastic::{Elastic, Stiffness};
 use ventriform::heart::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
-use ventriform::heart::deform::{DeformError, DeformParameters, WallEdge};
+use ventriform::heart::deform::{DeformError, DeformParameters, ThroughPoint, WallEdge};
 use ventriform::heart::fit::{Fit, fit};
 use ventriform::heart::judge::Flag;
 use ventriform::heart::judge::flags::DarkPart;
@@ -158,8 +159,16 @@ fn energy_never_rises_without_external_forces() {
             damping,
             ..Motion::default()
         };
-        let moved =
-            dynamics::run(&start, &body, &empty, &look, &motion, &Monitor::silent()).unwrap();
+        let moved = dynamics::run(
+            &start,
+            &body,
+            &empty,
+            &look,
+            &[],
+            &motion,
+            &Monitor::silent(),
+        )
+        .unwrap();
         assert!(moved.energy.len() > 5);
         for pair in moved.energy.windows(2) {
             assert!(pair[1] <= pair[0] * (1.0 + 1e-9), "{pair:?}");
@@ -360,6 +369,63 @@ fn a_margin_moves_both_sides_and_the_rim_outwards() {
         let moved = wide - narrow;
         assert!((2.5..5.0).contains(&moved), "{places:?}");
     }
+}
+
+/// The surface passes through the points that a person sets, on the side that they name, and what lies far from them
+/// stays.
+#[test]
+fn the_wall_passes_through_the_points_that_a_person_sets() {
+    let truth = cup(Vec3::zeros(), axis(), 1.0);
+    let template = ventricle(cup(Vec3::zeros(), axis(), 0.95));
+    let volume = scan(&truth, 44, |_| 1.0);
+    let fitted = |through: Vec<ThroughPoint>| {
+        let parameters = DeformParameters {
+            through,
+            ..DeformParameters::default()
+        };
+        fit(&volume, &template, &parameters, &Monitor::silent())
+    };
+    let plain = fitted(Vec::new()).unwrap().model;
+    let before = plain.apparent_mesh().clone();
+    let middle: Vec3 = before.vertices.iter().sum::<Vec3>() / before.vertices.len() as f64;
+    let across = axis().cross(&Vec3::z()).normalize();
+    let distance = |mesh: &TriMesh, place: &Vec3| {
+        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
+        tree.closest(place).unwrap().squared_distance.sqrt()
+    };
+    // Where a ray from the long axis meets the inner and the outer surface.
+    let side = |outer: bool| {
+        let range = if outer { 22.0..45.0 } else { 5.0..27.0 };
+        let steps = (0..400)
+            .map(|n| f64::from(n) / 8.0)
+            .filter(|t| range.contains(t));
+        let off = |t: &f64| distance(&before, &(middle + across * *t));
+        steps.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
+    };
+    for (outer, way) in [(true, 6.0), (true, -4.0), (false, -6.0), (false, 4.0)] {
+        let place = middle + across * (side(outer) + way);
+        let model = fitted(vec![ThroughPoint { outer, place }]).unwrap().model;
+        let after = model.apparent_mesh();
+        let off = distance(after, &place);
+        assert!(off < 1.0, "outer {outer}, {way}: {off} mm from the point");
+        assert_eq!(model.self_intersections, 0);
+        let far = before.vertices.iter().zip(&after.vertices);
+        let far = far.filter(|(p, _)| (**p - place).norm() > 45.0);
+        let moved = far.map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
+        assert!(
+            moved < 1.5,
+            "outer {outer}, {way}: {moved} mm far from the point"
+        );
+    }
+    let far = middle + across * 120.0;
+    let error = fitted(vec![ThroughPoint {
+        outer: true,
+        place: far,
+    }]);
+    assert!(matches!(
+        error.unwrap_err(),
+        DeformError::PointTooFar { outer: true, .. }
+    ));
 }
 
 #[test]

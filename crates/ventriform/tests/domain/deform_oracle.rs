@@ -107,7 +107,7 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
             ..Motion::default()
         };
         let monitor = Monitor::silent();
-        let implicit = dynamics::run(&start, &body, &field, &look, &motion, &monitor).unwrap();
+        let implicit = dynamics::run(&start, &body, &field, &look, &[], &motion, &monitor).unwrap();
         assert_eq!(implicit.reason, StopReason::Converged);
         let reference = explicit(&start, &body, &field, &look);
         let pairs = || reference.vertices.iter().zip(&implicit.mesh.vertices);

@@ -58,6 +58,7 @@ impl Attempt {
                 &body,
                 &setup.field,
                 &near,
+                &parameters.through,
                 &parameters.motion,
                 monitor,
             )?;

@@ -19,12 +19,14 @@
 
 use super::elastic::{Elastic, Turns};
 use super::sensors::{self, Density, SensorReading, SensorSettings};
+use super::through::{self, HOLD_STIFFNESS, Hold, ThroughPoint};
 use crate::base::geometry::Vec3;
 use crate::base::numeric::block_matrix::BlockMatrix;
 use crate::base::progress::{Cancelled, Monitor};
 use crate::heart::model::area_shares;
 use crate::image::grid::field::Field;
 use crate::mesh::TriMesh;
+use nalgebra::Matrix3;
 
 /// Why the motion ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,7 +105,7 @@ pub struct MotionResult {
     pub readings: Vec<SensorReading>,
 }
 
-/// Moves `body` in `field` from `start` until it rests.
+/// Moves `body` in `field` from `start` until it rests, with its surface through `points`.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -112,6 +114,7 @@ pub fn run(
     body: &Elastic,
     field: &Field,
     settings: &SensorSettings,
+    points: &[ThroughPoint],
     motion: &Motion,
     monitor: &Monitor,
 ) -> Result<MotionResult, Cancelled> {
@@ -140,13 +143,21 @@ pub fn run(
             };
             mean.add(readings, density, settled);
         }
-        let readings = mean.readings(&state.mesh);
+        let mut readings = mean.readings(&state.mesh);
+        through::mute(&mut readings, &settings.shift, points);
+        let holds = through::holds(&state.mesh, &settings.shift, points);
         let turns = body.turns(&state.mesh.vertices);
         let energy = body.energy_of(&state.mesh.vertices, &turns)
             + sensor_energy(&readings)
+            + hold_energy(&holds)
             + state.kinetic_energy();
         energies.push(energy);
-        let Some(farthest) = state.step(body, &turns, motion, &readings, mean.density) else {
+        let pulls = Pulls {
+            readings: &readings,
+            density: mean.density,
+            holds: &holds,
+        };
+        let Some(farthest) = state.step(body, &turns, motion, &pulls) else {
             reason = StopReason::Diverged;
             break;
         };
@@ -255,6 +266,18 @@ fn sensor_energy(readings: &[SensorReading]) -> f64 {
         .sum()
 }
 
+fn hold_energy(holds: &[Hold]) -> f64 {
+    let squares = holds.iter().map(|hold| hold.distance.powi(2));
+    0.5 * HOLD_STIFFNESS * squares.sum::<f64>()
+}
+
+/// What pulls the model in a step beside its own forces.
+struct Pulls<'a> {
+    readings: &'a [SensorReading],
+    density: Density,
+    holds: &'a [Hold],
+}
+
 /// Positions and velocities, and the parts of the equations that all steps share.
 struct MotionState {
     mesh: TriMesh,
@@ -305,8 +328,7 @@ impl MotionState {
         body: &Elastic,
         turns: &Turns,
         motion: &Motion,
-        readings: &[SensorReading],
-        density: Density,
+        pulls: &Pulls,
     ) -> Option<f64> {
         let dt = motion.time_step;
         let inertia = 1.0 / (dt * dt) + motion.damping / dt;
@@ -317,8 +339,8 @@ impl MotionState {
         body.add_targets(old, turns, &mut rhs);
         self.matrix.copy_from(&self.constant);
         let all = sensors::barycentric();
-        let weights = density.sensors(&all);
-        for (t, group) in readings.chunks_exact(weights.len()).enumerate() {
+        let weights = pulls.density.sensors(&all);
+        for (t, group) in pulls.readings.chunks_exact(weights.len()).enumerate() {
             let triangle = self.mesh.triangles[t];
             for (r, w) in group.iter().zip(weights) {
                 let pull = r.share * r.weight;
@@ -330,6 +352,16 @@ impl MotionState {
                 for corner in 0..3 {
                     rhs[triangle[corner] as usize] += target * w[corner];
                 }
+            }
+        }
+        for hold in pulls.holds {
+            let (triangle, w) = (self.mesh.triangles[hold.triangle], hold.weights);
+            for slot in 0..9 {
+                let share = HOLD_STIFFNESS * w[slot / 3] * w[slot % 3];
+                *self.matrix.at_mut(self.slots[hold.triangle][slot]) += Matrix3::identity() * share;
+            }
+            for corner in 0..3 {
+                rhs[triangle[corner] as usize] += hold.place * (HOLD_STIFFNESS * w[corner]);
             }
         }
         let mut new = old.clone();
@@ -367,7 +399,12 @@ mod tests {
         readings: &[SensorReading],
     ) -> Option<f64> {
         let turns = body.turns(&state.mesh.vertices);
-        state.step(body, &turns, motion, readings, Density::Full)
+        let pulls = Pulls {
+            readings,
+            density: Density::Full,
+            holds: &[],
+        };
+        state.step(body, &turns, motion, &pulls)
     }
 
     /// A body in flight, which nothing deforms, is slowed by the damping alone: implicitly,

@@ -1,5 +1,6 @@
 //! Why there is no fit.
 
+use crate::base::geometry::Vec3;
 use crate::base::progress::Cancelled;
 use crate::image::locate::LocateError;
 
@@ -25,6 +26,21 @@ pub enum DeformError {
         nodes: usize,
         /// Most nodes that a model with support springs may have.
         limit: usize,
+    },
+    /// A point that the wall should pass through lies far from every place where the wall may be.
+    #[error(
+        "the point ({:.1}, {:.1}, {:.1}) lies {distance_mm:.0} mm from the wall; the wall is pulled by at most {most_mm:.0} mm",
+        place.x, place.y, place.z
+    )]
+    PointTooFar {
+        /// Whether the outer surface should pass through it, or the inner one.
+        outer: bool,
+        /// The point, LPS mm.
+        place: Vec3,
+        /// Its distance from the wall.
+        distance_mm: f64,
+        /// The greatest one.
+        most_mm: f64,
     },
     /// A ventricle was searched for a template of another organ, or the other way round.
     #[error("the template shows another organ than the one that was searched")]

@@ -9,7 +9,8 @@
 //!    orientation ([`crate::image::locate`]).
 //! 2. [`setup`]: pose the template there ([`crate::heart::model::pose`]), blur the image about it.
 //! 3. [`align`]: move, turn, stretch and thicken the model as a whole.
-//! 4. [`dynamics`]: deform it under [`elastic`] forces and [`sensors`] until it rests.
+//! 4. [`dynamics`]: deform it under [`elastic`] forces and [`sensors`] until it rests; where a person has pulled the
+//!    contour, [`through`] the points that they set.
 //! 5. [`attempt`]: count folds and self-intersections; if there are any, repeat step 4 with four
 //!    times the stiffness, at most three times.
 //! 6. [`base_plane`]: move the rim of a ventricle where anatomy and image together put it.
@@ -50,12 +51,14 @@ pub mod sensors;
 pub mod setup;
 pub mod signal_end;
 mod thickness_calibration;
+pub mod through;
 pub mod wall_thickness;
 
 pub use error::DeformError;
 pub use fitted_model::{FittedModel, WallSurface, WallSurfaces};
 pub use organ_position::OrganPosition;
 pub use parameters::{DeformParameters, Orbit, WallEdge};
+pub use through::ThroughPoint;
 
 use crate::base::progress::{Monitor, Stage};
 use crate::heart::model::Template;
@@ -92,6 +95,8 @@ pub fn fit(
     } else {
         setup.posed.clone()
     };
+    let sides = setup.sensors(parameters, parameters.sensor).shift;
+    through::check(&aligned, &sides, &parameters.through)?;
     monitor.report(Stage::Deform, 0.0)?;
     let attempt = Attempt::best(&aligned, template, setup, parameters, monitor)?;
     Ok(attempt.into_model(template, setup, &aligned, parameters, monitor)?)

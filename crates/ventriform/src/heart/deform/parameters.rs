@@ -4,6 +4,7 @@ use super::dynamics::Motion;
 use super::elastic::Stiffness;
 use super::error::DeformError;
 use super::sensors::SensorKind;
+use super::through::ThroughPoint;
 use crate::base::geometry::Vec3;
 use crate::image::locate::Hints;
 use crate::image::locate::patient_orientation::Superior;
@@ -27,6 +28,8 @@ pub struct DeformParameters {
     /// A point of the base, LPS mm: the rim is put there, as far as the wall reaches or can be stretched, instead
     /// of where image and anatomy put it. Ventricles only. Default `None`.
     pub base: Option<Vec3>,
+    /// Points that the surface of the apparent wall passes through. Ventricles only. Default: none.
+    pub through: Vec<ThroughPoint>,
     /// Whether the model is aligned as a whole before it is deformed. Default true. If false, as
     /// for models that are placed by hand, the rest state is the posed template.
     pub align: bool,
@@ -63,6 +66,7 @@ impl Default for DeformParameters {
             superior: Superior::Body,
             anterior: None,
             base: None,
+            through: Vec::new(),
             align: true,
             stiffness: Stiffness::default(),
             sensor: SensorKind::HalfMaximum,
@@ -188,7 +192,10 @@ impl DeformParameters {
         }
         let hints = self.hints.centre.iter().chain(&self.hints.axis);
         let region = self.hints.region.iter().flat_map(|r| [&r.min, &r.max]);
-        if !hints.chain(region).all(|p| p.iter().all(|x| x.is_finite())) {
+        let points = hints
+            .chain(region)
+            .chain(self.through.iter().map(|point| &point.place));
+        if !points.clone().all(|p| p.iter().all(|x| x.is_finite())) {
             return Err(DeformError::HintNotFinite);
         }
         let superior = match self.superior {

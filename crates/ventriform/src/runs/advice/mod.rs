@@ -579,6 +579,16 @@ impl Explain for DeformError {
                 format!("Give a model of at most {limit} points, or use no support springs."),
             ),
             DeformError::Parameter { field, .. } => (Some(*field), FINITE_NUMBERS.into()),
+            DeformError::PointTooFar { outer, most_mm, .. } => (
+                Some(if *outer {
+                    "outer_through"
+                } else {
+                    "inner_through"
+                }),
+                format!(
+                    "Give points within {most_mm} mm of the wall, x,y,z in LPS millimetres, or none."
+                ),
+            ),
             DeformError::HintNotFinite | DeformError::OtherOrgan => (None, FINITE_NUMBERS.into()),
         };
         failure((Fault::Request, "invalid-parameter"), self, field, advice)

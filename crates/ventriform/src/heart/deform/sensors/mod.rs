@@ -27,7 +27,7 @@ use crate::base::progress::{Cancelled, Monitor};
 use crate::image::grid::field::Field;
 use crate::mesh::TriMesh;
 use profile::{Profile, ProfileEdge};
-use settings::WallSide;
+pub(super) use settings::WallSide;
 
 /// Sensors on each triangle: the centroids of its nine congruent parts.
 pub const PER_TRIANGLE: usize = 9;

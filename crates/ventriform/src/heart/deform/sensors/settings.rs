@@ -79,7 +79,7 @@ pub struct EdgeShift {
 
 /// The side of the wall that a sensor is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum WallSide {
+pub(in crate::heart::deform) enum WallSide {
     /// It faces the long axis.
     Inner,
     /// It faces away from the long axis.
@@ -90,7 +90,7 @@ pub(super) enum WallSide {
 
 impl EdgeShift {
     /// The side of the wall at `place` with this `normal`, and the shift of an edge there, mm.
-    pub(super) fn at(&self, place: &Vec3, normal: &Vec3) -> (WallSide, f64) {
+    pub(in crate::heart::deform) fn at(&self, place: &Vec3, normal: &Vec3) -> (WallSide, f64) {
         let along = self.axis[1] - self.axis[0];
         let (length, position) = (along.norm(), (place - self.axis[0]).dot(&along));
         let basal = position < 0.5 * length * length;
