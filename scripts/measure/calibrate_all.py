@@ -13,7 +13,7 @@ stand below. Out: the tables in scripts/measure/calibration, and by them
 - heart/deform/calibration.rs and heart/judge/uncertainty_calibration.rs (calibrate_walls.py)
 - heart/deform/thickness_calibration.rs (calibrate_thickness.py)
 - heart/beat/calibration.rs and heart/judge/volume_calibration.rs (calibrate_intervals.py)
-- heart/comparison/calibration.rs (calibrate_comparison.py)
+- heart/comparison/calibration.rs and heart/comparison/beat_calibration.rs (calibrate_comparison.py)
 - heart/serial/calibration.rs (calibrate_serial.py)
 
 of crates/ventriform/src. The same commit gives the same bytes on every machine of one kind. The fits are by the
@@ -38,6 +38,7 @@ PROGRAMS = [
     "volumes",
     "beats",
     "comparisons",
+    "beat_changes",
     "serials",
 ]
 ALL = "in,motion,rv,basal,apex,infarct,large,small,noise,gut,liver,coarse,turned,none"
@@ -74,6 +75,9 @@ OF_VOLUMES = ["6003", "6007", "6009"]
 # Seeds and numbers of gated studies, and of pairs without gates.
 BEATS = {"500": (500, 20), "501": (501, 20)}
 PAIRS = {"610": (610, 20)}
+# Of gated pairs.
+GATED_PAIRS = {"620": (620, 16)}
+KINDS_OF_GATED_PAIRS = "same,red40,red60,tid,fixed,tidred40,both60,red20"
 # Of gated series.
 SERIES = {"41": (41, 40)}
 # Seed and number of hearts with walls of every thickness, and of gated ones.
@@ -157,6 +161,8 @@ def beats(lab):
 
 def comparisons(lab):
     lab.run("comparisons", *lab.studies("pairs", PAIRS, "--gates", 0), into=TABLES / "comparisons.csv")
+    gated = lab.studies("pairs", GATED_PAIRS, "--gates", 8, "--kinds", KINDS_OF_GATED_PAIRS)
+    lab.run("beat_changes", *gated, into=TABLES / "beat_changes.csv")
     script("calibrate_comparison.py", "--write")
 
 
@@ -174,9 +180,9 @@ def script(name, *arguments):
     subprocess.run([sys.executable, ROOT / "scripts/measure" / name, *arguments], check=True)
 
 
-def build():
-    """The programs in release, built from this tree; the folder that they are in."""
-    bins = [flag for program in PROGRAMS for flag in ("--bin", program)]
+def build(programs):
+    """Builds programs in release from this tree; the folder that they are in."""
+    bins = [flag for program in programs for flag in ("--bin", program)]
     command = ["cargo", "build", "--release", "--quiet", "--package", "ventriform-evaluation", *bins]
     subprocess.run(command, cwd=ROOT, check=True)
     return pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
@@ -189,7 +195,7 @@ def main():
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="some of the tables")
     parser.add_argument("--programs", type=pathlib.Path, help="the folder of the programs, instead of building them")
     given = parser.parse_args()
-    lab = Lab(given.cases, given.share, given.programs or build())
+    lab = Lab(given.cases, given.share, given.programs or build(PROGRAMS))
     for part in given.only:
         PARTS[part](lab)
 

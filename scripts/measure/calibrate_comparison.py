@@ -2,9 +2,11 @@
 """Estimates how much two scans of an unchanged heart differ, from tables of simulated pairs and of real halves.
 
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
-    calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and
-                                            halves.csv beside it, and writes
-                                            crates/ventriform/src/heart/comparison/calibration.rs
+    calibrate_comparison.py --check-beats TABLE
+                                            figures of a table of changes of the beat
+    calibrate_comparison.py --write         estimates the constants from comparisons.csv, halves.csv and beat_changes.csv
+                                            of scripts/measure/calibration, and writes calibration.rs and
+                                            beat_calibration.rs of crates/ventriform/src/heart/comparison
 
 A table is what the program `comparisons` prints; calibrate_all.py makes that of the pairs. By itself:
 
@@ -15,6 +17,12 @@ Halves are such a table too: the counts of one patient's projections divided in 
 counts each), or drawn twice from the projections of the patient's image (86 pairs of 6.4 M), both reconstructed and
 compared as stress and rest, with a pair.json of the kind `half`. The scan is no part of the tree.
 
+beat_changes.csv is of gated pairs, by the program `beat_changes`:
+
+    cargo run --release -p ventriform-evaluation --bin simulate -- pairs --out PAIRS --seed 620 --n 16 \
+        --kinds same,red40,red60,tid,fixed,tidred40,both60,red20
+    cargo run --release -p ventriform-evaluation --bin beat_changes -- PAIRS/* > TABLE
+
 - Noise of a usual pair: root mean square of the difference over the pairs without reversible wall; its rows' shares
   likewise, over these and the halves. What smoothing leaves for one point of what it takes away: the quotient of both
   root mean squares.
@@ -24,6 +32,8 @@ compared as stress and rest, with a pair.json of the kind `half`. The scan is no
   noise counts as OTHER_NOISE_POINTS of it.
 - Error of a changed share: its root mean square over the pairs that lost 40 or 60 per cent and were found, as a
   share of it.
+- Errors of changes of the beat: of every figure the change that was found less the true one, of volumes that of the
+  logarithm, as calibrate_serial.py estimates them.
 - Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
   down again.
 """
@@ -32,12 +42,30 @@ import argparse
 import csv
 import pathlib
 
+import calibrate_serial
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLE = ROOT / "scripts/measure/calibration/comparisons.csv"
 HALVES = ROOT / "scripts/measure/calibration/halves.csv"
 CONSTANTS = ROOT / "crates/ventriform/src/heart/comparison/calibration.rs"
+BEATS = ROOT / "scripts/measure/calibration/beat_changes.csv"
+BEAT_CONSTANTS = ROOT / "crates/ventriform/src/heart/comparison/beat_calibration.rs"
+BEAT_NAMES = [
+    ("EF", "ef_percent", "Ejection fraction, points"),
+    ("EDV", "edv_ml", "Logarithm of the end-diastolic volume"),
+    ("ESV", "esv_ml", "Logarithm of the end-systolic volume"),
+    ("SEGMENT_MOTION", "segment_motion_mm", "Inward motion of a segment, mm"),
+    ("SEGMENT_THICKENING", "segment_thickening_percent", "Thickening of a segment, points"),
+]
+BEAT_HEADER = """\
+//! Constants of changes of the beat from rest to stress. Written by `scripts/measure/calibrate_comparison.py`: do not
+//! edit.
+//!
+//! In: simulated gated pairs. Out: how much the figures of both beats differ beyond what truly changed.
+
+use super::figure_change::ChangeError;
+"""
 FOUND_PERCENT = 3
 TURN_MARGIN = 2.5
 LIMIT_SHARE, OTHER_NOISE_POINTS = 0.96, 4
@@ -157,6 +185,8 @@ def write():
         text += f"\n/// {says}\n{name}: {kind} = {rounded};\n"
         print(name.split()[-1], rounded)
     CONSTANTS.write_text(text)
+    text = BEAT_HEADER + calibrate_serial.constants(list(csv.DictReader(open(BEATS))), BEAT_NAMES)
+    BEAT_CONSTANTS.write_text(text)
 
 
 def check(table):
@@ -197,10 +227,16 @@ def check(table):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--check-beats", metavar="TABLE", nargs="?", const=BEATS)
     what.add_argument("--check", metavar="TABLE", nargs="?", const=TABLE)
     what.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
-    write() if arguments.write else check(arguments.check)
+    if arguments.write:
+        write()
+    elif arguments.check_beats:
+        calibrate_serial.check_figures(list(csv.DictReader(open(arguments.check_beats))), BEAT_NAMES)
+    else:
+        check(arguments.check)
 
 
 if __name__ == "__main__":

@@ -64,10 +64,14 @@ FILES = {
 def errors(name, table):
     """-> error of each figure with its causes (size of the cavity, share of the wall that is dark, what one standard
     deviation of the thickness makes of the figure), and the set of each row."""
-    _, _, _, cavity, figures = FILES[name]
     with open(table, newline="") as file:
         lines = [line for line in file if line.count(",") > 5]
-    rows = list(csv.DictReader(lines))
+    return errors_of(name, list(csv.DictReader(lines)))
+
+
+def errors_of(name, rows):
+    """The same of the rows of a table."""
+    _, _, _, cavity, figures = FILES[name]
 
     def column(name):
         return np.array([float(row[name]) for row in rows])

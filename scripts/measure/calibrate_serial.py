@@ -53,12 +53,18 @@ HEADER = """\
 //! In: simulated hearts, and halves of a real one, that were scanned again. Out: how much their figures differ beyond
 //! what truly changed.
 
-use super::change_error::ChangeError;
+use crate::heart::comparison::ChangeError;
 """
 
 
 def number(row, name):
     return float(row[name]) if row[name] else None
+
+
+def is_unchanged(row):
+    """Whether the figure is truly the same in both scans."""
+    known = row["true_later"] != ""
+    return row["true_earlier"] == row["true_later"] if known else row["kind"] in UNCHANGED
 
 
 def errors(rows, figure):
@@ -87,26 +93,32 @@ def root_mean_square(values):
     return math.sqrt(sum(value * value for value in values) / len(values))
 
 
-def write():
-    rows = [row for table in (TABLE, HALVES) for row in csv.DictReader(open(table))]
-    usual = root_mean_square(number(row, "noise_points") for row in rows if row["figure"] == "cavity_ml")
-    text = HEADER
-    for name, figure, what in NAMES:
+def constants(rows, names):
+    """The lines of the constants of these figures."""
+    noises = {row["series"]: number(row, "noise_points") for row in rows}
+    usual = root_mean_square(noises.values())
+    text = ""
+    for name, figure, what in names:
         own = errors(rows, figure)
         least = root_mean_square(error / math.hypot(1, noise / usual) for error, noise, _ in own)
         text += f"\n/// {what}.\npub(super) const {name}: ChangeError = ChangeError {{\n"
         text += f"    least: {least:.3g},\n    per_point: {least / usual:.3g},\n}};\n"
         print(f"{figure:24} {len(own):4} errors, {root_mean_square(error for error, _, _ in own):.3f}")
-    CONSTANTS.write_text(text)
+    return text
 
 
-def check(table):
-    rows = list(csv.DictReader(open(table)))
-    for _, figure, _ in NAMES:
+def write():
+    rows = [row for table in (TABLE, HALVES) for row in csv.DictReader(open(table))]
+    CONSTANTS.write_text(HEADER + constants(rows, NAMES))
+
+
+def check_figures(rows, names):
+    """Prints of every figure the errors, and how often verdicts and intervals are right."""
+    for _, figure, _ in names:
         own = errors(rows, figure)
         if not own:
             continue
-        unchanged = [row for _, _, row in own if row["kind"] in UNCHANGED]
+        unchanged = [row for _, _, row in own if is_unchanged(row)]
         told = sum(row["verdict"] == "yes" for row in unchanged)
         true_changes = [(number(row, "change") - shift(row, error), row) for error, _, row in own]
         held = sum(number(row, "low") <= change <= number(row, "high") for change, row in true_changes)
@@ -116,6 +128,11 @@ def check(table):
             f"{figure:24} {len(own):4}: error {mean:+.3f}, rms {size:.3f}; "
             f"told changed {told} of {len(unchanged)} unchanged; interval holds the true change in {held} of {len(own)}"
         )
+
+
+def check(table):
+    rows = list(csv.DictReader(open(table)))
+    check_figures(rows, NAMES)
     by_kind = defaultdict(list)
     for row in rows:
         if row["figure"] in ("worse_percent", "better_percent"):

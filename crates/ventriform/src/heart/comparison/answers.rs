@@ -28,7 +28,7 @@ pub(super) const DRAWS: usize = 200;
 /// Shares of the draws below the ends of an interval.
 const END_SHARES: [f64; 2] = [0.05, 0.95];
 /// Standard deviations from the mean to the ends of an interval.
-const HALF_WIDTH_SDS: f64 = 1.645;
+pub(super) const HALF_WIDTH_SDS: f64 = 1.645;
 /// Share of the wall up to which nothing is said to have changed, per cent.
 const SMALL_PERCENT: f64 = 1.0;
 /// Share of the wall that may have changed without notice where it is said that nothing did, per cent.

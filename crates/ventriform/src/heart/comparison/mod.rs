@@ -12,6 +12,9 @@
 //! 5. Draws of correlated noise give each share and each score an interval and a verdict ([`Answers`],
 //!    [`ScoreAnswers`]).
 //!
+//! 6. Changes of the beat, where both scans are gated, have the errors of hearts whose beat did not change
+//!    (`beat_change.rs`).
+//!
 //! [`ComparisonFlag`] names what makes a comparison doubtful.
 //!
 //! Guaranteed: a scan multiplied by a factor gives the same figures.
@@ -20,9 +23,12 @@
 //! shows as a negative difference and counts as reverse redistribution. No category is derived.
 
 mod answers;
+mod beat_calibration;
+pub mod beat_change;
 mod border;
 mod calibration;
 mod difference;
+mod figure_change;
 mod flags;
 mod noise;
 mod scale;
@@ -32,6 +38,8 @@ mod turn;
 
 pub use answers::{Answer, Answers, FEW_COUNTS_LOSS_PERCENT, Verdict};
 pub use difference::{Change, ComparedSegment, ComparedTerritory, PartFigures};
+pub use figure_change::{ChangeError, ChangingFigure, FigureChange};
+pub(in crate::heart) use figure_change::{by_difference, by_share};
 pub use flags::{ComparisonFlag, Reason, WhichScan};
 pub use noise::Noise;
 pub use scale::Sides;

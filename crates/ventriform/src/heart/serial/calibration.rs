@@ -3,7 +3,7 @@
 //! In: simulated hearts, and halves of a real one, that were scanned again. Out: how much their figures differ beyond
 //! what truly changed.
 
-use super::change_error::ChangeError;
+use crate::heart::comparison::ChangeError;
 
 /// Ejection fraction, points.
 pub(super) const EF: ChangeError = ChangeError {

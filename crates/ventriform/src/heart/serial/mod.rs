@@ -2,7 +2,7 @@
 //!
 //! In: hearts fitted to scans of one patient, all at rest or all at stress, by one model. Out: where each heart lies
 //! against the first one's ([`Registration`]), what all have in common ([`CommonHeart`]), from which each is fitted
-//! again, and of every figure its change with an interval and a verdict ([`FigureChange`]).
+//! again, and of every figure its change with an interval and a verdict ([`FigureChange`](crate::heart::comparison::FigureChange)).
 //!
 //! 1. Every later heart is registered to the first one as a rigid body: by the nodes of the model, and then by the
 //!    images about the wall.
@@ -11,7 +11,7 @@
 //! 3. Uptake is compared place by place as that of rest and stress is ([`crate::heart::comparison`]): counts are matched
 //!    by the wall that did not change, and the noise of the pair is its own.
 //! 4. A figure has changed if its 95 % interval excludes that it did not, and has not if that interval excludes a change
-//!    that matters ([`SerialFigure`]). The errors are those of hearts that were scanned again and had not changed.
+//!    that matters ([`SERIAL_FIGURES`]). The errors are those of hearts that were scanned again and had not changed.
 //!
 //! Guaranteed: the same scans give the same figures, whatever the number of threads.
 //!
@@ -19,14 +19,12 @@
 //! plane that moved against the apex while the wall stayed is not seen.
 
 mod calibration;
-mod change;
-mod change_error;
 mod common;
+mod figures;
 mod flags;
 mod registration;
 
-pub use change::{FigureChange, SERIAL_FIGURES, SerialFigure, segment_error};
-pub use change_error::ChangeError;
 pub use common::CommonHeart;
+pub use figures::{SERIAL_FIGURES, segment_error};
 pub use flags::SerialFlag;
 pub use registration::{PlacedHeart, Registration, RigidMotion, registered};

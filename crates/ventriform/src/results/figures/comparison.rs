@@ -149,6 +149,8 @@ pub const FIGURES: &[Figure] = &[
         "Ejection fraction at stress less that at rest.",
     )
     .short("EF change")
+    .within("beat/ef_change_interval_points")
+    .answered("beat/ef_change_verdict")
     .signed()
     .under(BEAT)
     .detail()
@@ -190,6 +192,30 @@ pub const FIGURES: &[Figure] = &[
         0,
         "The smallest volume of the cavity over the beat at rest.",
     )
+    .under(BEAT)
+    .detail(),
+    figure(
+        "beat/edv_change_ml",
+        "Change of the end-diastolic volume",
+        Unit::MILLILITRE,
+        0,
+        "End-diastolic volume at stress less that at rest.",
+    )
+    .within("beat/edv_change_interval_ml")
+    .answered("beat/edv_change_verdict")
+    .signed()
+    .under(BEAT)
+    .detail(),
+    figure(
+        "beat/esv_change_ml",
+        "Change of the end-systolic volume",
+        Unit::MILLILITRE,
+        0,
+        "End-systolic volume at stress less that at rest.",
+    )
+    .within("beat/esv_change_interval_ml")
+    .answered("beat/esv_change_verdict")
+    .signed()
     .under(BEAT)
     .detail(),
     figure(
@@ -387,6 +413,8 @@ pub const SEGMENT_FIGURES: &[Figure] = &[
         1,
         "Motion inward at stress less that at rest.",
     )
+    .within("motion_change_interval_mm")
+    .answered("motion_change_verdict")
     .signed(),
     figure(
         "thickening_change_points",
@@ -395,5 +423,7 @@ pub const SEGMENT_FIGURES: &[Figure] = &[
         0,
         "Thickening at stress less that at rest.",
     )
+    .within("thickening_change_interval_points")
+    .answered("thickening_change_verdict")
     .signed(),
 ];

@@ -136,8 +136,16 @@ pub struct ComparedSegmentReport {
     pub rest_score: Option<u8>,
     /// Change of motion from rest to stress, mm; `null` unless both scans are gated.
     pub motion_change_mm: Option<f64>,
+    /// Interval of that change: in nine of ten pairs such intervals hold all 17 changes together.
+    pub motion_change_interval_mm: Option<[f64; 2]>,
+    /// Whether the motion changed.
+    pub motion_change_verdict: Option<Verdict>,
     /// Change of thickening from rest to stress, points.
     pub thickening_change_points: Option<f64>,
+    /// Its interval, likewise.
+    pub thickening_change_interval_points: Option<[f64; 2]>,
+    /// Whether the thickening changed.
+    pub thickening_change_verdict: Option<Verdict>,
 }
 
 /// The wall of an artery at stress and at rest.
@@ -161,6 +169,10 @@ pub struct BeatChange {
     pub rest_ef_percent: Option<f64>,
     /// Change from rest to stress, points.
     pub ef_change_points: Option<f64>,
+    /// Its interval.
+    pub ef_change_interval_points: Option<[f64; 2]>,
+    /// Whether it changed.
+    pub ef_change_verdict: Option<Verdict>,
     /// End-diastolic volume at stress, ml.
     pub stress_edv_ml: f64,
     /// End-diastolic volume at rest.
@@ -169,6 +181,18 @@ pub struct BeatChange {
     pub stress_esv_ml: f64,
     /// End-systolic volume at rest.
     pub rest_esv_ml: f64,
+    /// Change of the end-diastolic volume from rest to stress.
+    pub edv_change_ml: Option<f64>,
+    /// Its interval.
+    pub edv_change_interval_ml: Option<[f64; 2]>,
+    /// Whether it changed.
+    pub edv_change_verdict: Option<Verdict>,
+    /// Change of the end-systolic volume.
+    pub esv_change_ml: Option<f64>,
+    /// Its interval.
+    pub esv_change_interval_ml: Option<[f64; 2]>,
+    /// Whether it changed.
+    pub esv_change_verdict: Option<Verdict>,
 }
 
 /// A scan of which no beat could be compared.

@@ -249,7 +249,21 @@ pub fn of_comparison(report: &ComparisonReport) -> Vec<String> {
         && let (Some(stress), Some(rest)) = (beat.stress_ef_percent, beat.rest_ef_percent)
     {
         let change = beat.ef_change_points.map_or(String::new(), |change| {
-            format!(" ({} points)", signed(change, 0))
+            let points = signed(change, 0);
+            let says = match (beat.ef_change_interval_points, beat.ef_change_verdict) {
+                (Some([low, high]), Some(verdict)) => {
+                    let ends = format!("{} to {}", signed(low, 0), signed(high, 0));
+                    let says = match verdict {
+                        Verdict::Yes if change < 0.0 => "lower at stress",
+                        Verdict::Yes => "higher at stress",
+                        Verdict::No => "unchanged",
+                        Verdict::CannotTell => "too uncertain to call a change",
+                    };
+                    format!(", {ends}: {says}")
+                }
+                _ => String::new(),
+            };
+            format!(" ({points} points{says})")
         });
         said.push(format!(
             "Ejection fraction {} % at stress, {} % at rest{change}; end-diastolic volume {} ml and {} ml.",

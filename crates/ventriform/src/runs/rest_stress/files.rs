@@ -3,7 +3,7 @@
 use super::hearts::{ComparedHeart, ComparedHearts};
 use super::{names, report as written, slices};
 use crate::base::progress::{Monitor, Stage};
-use crate::heart::comparison::WhichScan;
+use crate::heart::comparison::{Verdict, WhichScan};
 use crate::heart::polar::{FigureMap, PolarMap, WallFigure};
 use crate::image::volume::Provenance;
 use crate::parameters::ComparisonParameters;
@@ -175,16 +175,17 @@ fn maps_of(scan: WhichScan, heart: &ComparedHeart) -> Vec<NamedFile> {
 fn segments_csv(report: &ComparisonReport) -> String {
     let mut text = String::from(
         "segment,name,stress_percent,rest_percent,difference_points,reversible_percent,fixed_percent,\
-         stress_score,rest_score,motion_change_mm,thickening_change_points\n",
+         stress_score,rest_score,motion_change_mm,motion_changed,thickening_change_points,thickening_changed\n",
     );
     let known = |figure: Option<f64>| figure.map_or_else(String::new, |figure| figure.to_string());
     let score = |score: Option<u8>| known(score.map(f64::from));
+    let verdict = |verdict: Option<Verdict>| verdict.map_or("", Verdict::as_str);
     for segment in &report.segments {
         let uptake = &segment.uptake;
         // Writing into a String cannot fail.
         let _ = writeln!(
             text,
-            "{},\"{}\",{},{},{},{},{},{},{},{},{}",
+            "{},\"{}\",{},{},{},{},{},{},{},{},{},{},{}",
             segment.segment,
             segment.name,
             known(uptake.stress_percent),
@@ -195,7 +196,9 @@ fn segments_csv(report: &ComparisonReport) -> String {
             score(segment.stress_score),
             score(segment.rest_score),
             known(segment.motion_change_mm),
-            known(segment.thickening_change_points)
+            verdict(segment.motion_change_verdict),
+            known(segment.thickening_change_points),
+            verdict(segment.thickening_change_verdict)
         );
     }
     text

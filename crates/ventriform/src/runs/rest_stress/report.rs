@@ -2,7 +2,10 @@
 
 use super::hearts::{ComparedHeart, ComparedHearts};
 use crate::base::numeric::decimals::round;
-use crate::heart::comparison::{Answer, WhichScan};
+use crate::heart::comparison::beat_change::{
+    EDV, EF, ESV, SEGMENT_MOTION, SEGMENT_THICKENING, answer, segment_answer,
+};
+use crate::heart::comparison::{Answer, ChangingFigure, WhichScan};
 use crate::heart::normals::{Perfusion, summed_percent};
 use crate::heart::polar::{PolarMap, PolarSummary};
 use crate::image::volume::{HeldGates, Provenance};
@@ -76,6 +79,35 @@ fn no_beat(hearts: &ComparedHearts) -> Vec<NoBeat> {
     reasons.collect()
 }
 
+/// What changed from rest to stress of the beats [stress, rest], of a pair with this noise, points.
+fn beat_change([stress, rest]: &[BeatReport; 2], noise: f64) -> BeatChange {
+    let ends = |answer: Answer| answer.interval.map(round);
+    let ef = rest.ef_percent.zip(stress.ef_percent);
+    let ef = ef.map(|(rest, stress)| answer(&EF, [rest, stress], noise));
+    // Without a beat there is no end of systole, either.
+    let volume =
+        |figure: &ChangingFigure, values: [f64; 2]| ef.map(|_| answer(figure, values, noise));
+    let edv = volume(&EDV, [rest.edv_ml, stress.edv_ml]);
+    let esv = volume(&ESV, [rest.esv_ml, stress.esv_ml]);
+    BeatChange {
+        stress_ef_percent: stress.ef_percent,
+        rest_ef_percent: rest.ef_percent,
+        ef_change_points: ef.map(|own| round(own.value)),
+        ef_change_interval_points: ef.map(ends),
+        ef_change_verdict: ef.map(|own| own.verdict),
+        stress_edv_ml: stress.edv_ml,
+        rest_edv_ml: rest.edv_ml,
+        stress_esv_ml: stress.esv_ml,
+        rest_esv_ml: rest.esv_ml,
+        edv_change_ml: edv.map(|own| round(own.value)),
+        edv_change_interval_ml: edv.map(ends),
+        edv_change_verdict: edv.map(|own| own.verdict),
+        esv_change_ml: esv.map(|own| round(own.value)),
+        esv_change_interval_ml: esv.map(ends),
+        esv_change_verdict: esv.map(|own| own.verdict),
+    }
+}
+
 /// The report of `hearts`.
 pub(super) fn comparison_report(
     hearts: &ComparedHearts,
@@ -87,24 +119,35 @@ pub(super) fn comparison_report(
     let beats = hearts.stress.beat().zip(hearts.rest.beat());
     let beats = beats.map(|(stress, rest)| [stress.report(), rest.report()]);
     let map = hearts.rest.map();
-    let motion = |segment: usize| {
+    let noise = change.noise.points;
+    let moved = |segment: usize| {
         let [stress, rest] = beats.as_ref()?;
         let of = |report: &BeatReport| {
             let mut own = report.segments.iter();
             let found = own.find(|own| own.segment == segment)?;
-            Some((found.motion_mm, found.thickening_percent))
+            Some([found.motion_mm, found.thickening_percent])
         };
-        let (stress, rest) = (of(stress)?, of(rest)?);
-        Some((stress.0 - rest.0, stress.1 - rest.1))
+        let [stress, rest] = [of(stress)?, of(rest)?];
+        let answer = |figure: &ChangingFigure, index: usize| {
+            segment_answer(figure, [rest[index], stress[index]], noise)
+        };
+        Some([answer(&SEGMENT_MOTION, 0), answer(&SEGMENT_THICKENING, 1)])
     };
-    let segments = change.segments.iter().map(|own| ComparedSegmentReport {
-        segment: own.segment,
-        name: map.map_or_else(String::new, |map| map.name_of(own.segment)),
-        uptake: UptakeChange::from_figures(&own.figures),
-        stress_score: score(hearts.stress.perfusion(), own.segment),
-        rest_score: score(hearts.rest.perfusion(), own.segment),
-        motion_change_mm: motion(own.segment).map(|change| round(change.0)),
-        thickening_change_points: motion(own.segment).map(|change| round(change.1)),
+    let segments = change.segments.iter().map(|own| {
+        let [motion, thickening] = moved(own.segment).map_or([None; 2], |both| both.map(Some));
+        ComparedSegmentReport {
+            segment: own.segment,
+            name: map.map_or_else(String::new, |map| map.name_of(own.segment)),
+            uptake: UptakeChange::from_figures(&own.figures),
+            stress_score: score(hearts.stress.perfusion(), own.segment),
+            rest_score: score(hearts.rest.perfusion(), own.segment),
+            motion_change_mm: motion.map(|own| round(own.value)),
+            motion_change_interval_mm: motion.as_ref().map(ends),
+            motion_change_verdict: motion.map(|own| own.verdict),
+            thickening_change_points: thickening.map(|own| round(own.value)),
+            thickening_change_interval_points: thickening.as_ref().map(ends),
+            thickening_change_verdict: thickening.map(|own| own.verdict),
+        }
     });
     let scores = hearts.scores.as_ref();
     let sum = |answer: Answer| answer.value as u32;
@@ -151,18 +194,7 @@ pub(super) fn comparison_report(
                 uptake: UptakeChange::from_figures(&own.figures),
             })
             .collect(),
-        beat: beats.as_ref().map(|[stress, rest]| BeatChange {
-            stress_ef_percent: stress.ef_percent,
-            rest_ef_percent: rest.ef_percent,
-            ef_change_points: stress
-                .ef_percent
-                .zip(rest.ef_percent)
-                .map(|(stress, rest)| round(stress - rest)),
-            stress_edv_ml: stress.edv_ml,
-            rest_edv_ml: rest.edv_ml,
-            stress_esv_ml: stress.esv_ml,
-            rest_esv_ml: rest.esv_ml,
-        }),
+        beat: beats.as_ref().map(|both| beat_change(both, noise)),
         no_beat: no_beat(hearts),
         stress: scan_report(&hearts.stress, of_scan(0)),
         rest: scan_report(&hearts.rest, of_scan(1)),

@@ -5,8 +5,9 @@ use super::fits::ScanFit;
 use super::hearts::{SerialHearts, SerialScan};
 use super::order::SerialOrder;
 use crate::base::progress::Monitor;
+use crate::heart::comparison::FigureChange;
 use crate::heart::comparison::{FEW_COUNTS_LOSS_PERCENT, Verdict};
-use crate::heart::serial::{FigureChange, SERIAL_FIGURES, SerialFlag};
+use crate::heart::serial::{SERIAL_FIGURES, SerialFlag};
 use crate::image::volume::{Provenance, ReadLimits, ReadOptions, VolumeFile, provenance};
 use crate::runs::rest_stress::{FEW_MATCHED_PERCENT, RESOLUTION_MM};
 

@@ -2,8 +2,9 @@
 
 use super::hearts::{SerialHearts, SerialPair, SerialScan};
 use crate::base::numeric::decimals::round;
+use crate::heart::comparison::FigureChange;
 use crate::heart::polar::PolarSummary;
-use crate::heart::serial::{FigureChange, segment_error};
+use crate::heart::serial::segment_error;
 use crate::image::volume::Provenance;
 use crate::parameters::SerialParameters;
 use crate::results::report::{

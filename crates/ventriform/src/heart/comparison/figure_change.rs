@@ -1,28 +1,39 @@
-//! The change of a figure between two scans: its interval, and whether there was one.
+//! The change of a figure between two scans of one heart: its interval, and whether there was one.
 //!
 //! In: the figure in both scans, and the noise of the pair. Out: the [`FigureChange`]. The standard deviation of a
 //! change that is none grows with the noise ([`ChangeError`]); volumes and masses change by a share, all others by a
 //! difference.
 //!
 //! - `yes`: the 95 % interval excludes that nothing changed: one figure of twenty that did not change says so.
-//! - `no`: that interval excludes a change that matters ([`SerialFigure::matters`]).
+//! - `no`: that interval excludes a change that matters ([`ChangingFigure::matters`]).
 //! - `cannot tell`: neither.
-//!
-//! What matters is the program's choice: 5 points of the ejection fraction are the usual sign of a change in follow-up
-//! (cardiotoxicity, therapy), the others are about as much of their usual range.
 
-use super::calibration as constants;
-use super::change_error::ChangeError;
-use crate::heart::comparison::Verdict;
+use super::answers::Verdict;
 
 /// Standard deviations from the mean to the ends of a 95 % interval.
 const HALF_WIDTH_SDS: f64 = 1.96;
 /// Standard deviations beyond that in which nine of ten draws lie on one side.
 const FOUND_SDS: f64 = 1.282;
 
+/// The standard deviation of a change that is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChangeError {
+    /// Without noise; of a share that of its logarithm.
+    pub least: f64,
+    /// More for each point of the pair's noise, added in squares.
+    pub per_point: f64,
+}
+
+impl ChangeError {
+    /// The deviation in a pair with this noise, points.
+    pub fn of_noise(self, noise_points: f64) -> f64 {
+        self.least.hypot(self.per_point * noise_points)
+    }
+}
+
 /// A figure that scans have, and how its change is judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SerialFigure {
+pub struct ChangingFigure {
     /// Its place in the report of a scan.
     pub place: &'static str,
     /// Whether it changes by a share of itself: volumes and masses.
@@ -33,8 +44,13 @@ pub struct SerialFigure {
     pub error: ChangeError,
 }
 
-const fn by_share(place: &'static str, matters: f64, error: ChangeError) -> SerialFigure {
-    SerialFigure {
+/// A figure that changes by a share of itself.
+pub(in crate::heart) const fn by_share(
+    place: &'static str,
+    matters: f64,
+    error: ChangeError,
+) -> ChangingFigure {
+    ChangingFigure {
         place,
         by_share: true,
         matters,
@@ -42,32 +58,18 @@ const fn by_share(place: &'static str, matters: f64, error: ChangeError) -> Seri
     }
 }
 
-const fn by_difference(place: &'static str, matters: f64, error: ChangeError) -> SerialFigure {
-    SerialFigure {
+/// A figure that changes by a difference.
+pub(in crate::heart) const fn by_difference(
+    place: &'static str,
+    matters: f64,
+    error: ChangeError,
+) -> ChangingFigure {
+    ChangingFigure {
         place,
         by_share: false,
         matters,
         error,
     }
-}
-
-/// The figures whose change is judged by the error of hearts that were scanned again.
-pub const SERIAL_FIGURES: &[SerialFigure] = &[
-    by_difference("ef_percent", 5.0, constants::EF),
-    by_share("edv_ml", 15.0, constants::EDV),
-    by_share("esv_ml", 20.0, constants::ESV),
-    by_share("cavity_ml", 15.0, constants::CAVITY),
-    by_share("mass_g", 15.0, constants::MASS),
-    by_difference("dark_percent", 5.0, constants::DARK),
-    by_difference("motion_mm", 1.5, constants::MOTION),
-    by_difference("thickening_percent", 10.0, constants::THICKENING),
-    by_difference("phase_sd_degrees", 10.0, constants::PHASE_SD),
-    by_difference("phase_bandwidth_degrees", 30.0, constants::PHASE_BANDWIDTH),
-];
-
-/// The error of the mean uptake of a segment, points.
-pub fn segment_error() -> ChangeError {
-    constants::SEGMENT_UPTAKE
 }
 
 /// A change from one scan to another.
@@ -83,19 +85,23 @@ pub struct FigureChange {
     pub least: f64,
 }
 
-impl SerialFigure {
+impl ChangingFigure {
     /// The change of the figure between two scans with this noise, points.
     pub fn change(&self, earlier: f64, later: f64, noise_points: f64) -> FigureChange {
-        let deviation = self.error.of_noise(noise_points);
-        let told = (HALF_WIDTH_SDS + FOUND_SDS) * deviation;
+        self.within([earlier, later], noise_points, HALF_WIDTH_SDS)
+    }
+
+    /// That change with an interval of so many standard deviations to either side.
+    pub(super) fn within(&self, [earlier, later]: [f64; 2], noise: f64, sds: f64) -> FigureChange {
+        let deviation = self.error.of_noise(noise);
+        let told = (sds + FOUND_SDS) * deviation;
         let change = later - earlier;
         if !self.by_share || earlier <= 0.0 || later <= 0.0 {
-            let ends = [-1.0, 1.0].map(|side| change + side * HALF_WIDTH_SDS * deviation);
+            let ends = [-1.0, 1.0].map(|side| change + side * sds * deviation);
             return FigureChange::judged(change, ends, self.matters, told);
         }
         let share = (later / earlier).ln();
-        let ends = [-1.0, 1.0]
-            .map(|side| earlier * ((share + side * HALF_WIDTH_SDS * deviation).exp() - 1.0));
+        let ends = [-1.0, 1.0].map(|side| earlier * ((share + side * sds * deviation).exp() - 1.0));
         let matters = earlier * self.matters / 100.0;
         FigureChange::judged(change, ends, matters, earlier * told.exp_m1())
     }
@@ -151,7 +157,7 @@ impl FigureChange {
 mod tests {
     use super::*;
 
-    const EF: SerialFigure = by_difference(
+    const EF: ChangingFigure = by_difference(
         "ef_percent",
         5.0,
         ChangeError {
