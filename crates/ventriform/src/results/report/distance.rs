@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
+use super::patches::Patches;
 use super::summary::Summary;
 use crate::base::geometry::bvh::{Bvh, Closest};
 use crate::base::geometry::{Vec3, triangle};
@@ -175,6 +176,7 @@ fn farthest(
     let distance = |c: &Closest| c.squared_distance.sqrt();
     let mut best = closest.iter().map(distance).fold(found, f64::max);
     let mut cells = from.triangles.clone();
+    let patches = is_fine(from, to).then(|| Patches::new(to));
     loop {
         let limit = best * (1.0 + EXCESS_TOLERANCE) + f64::EPSILON;
         cells = (cells.into_par_iter().with_min_len(256))
@@ -183,6 +185,8 @@ fn farthest(
                 let known = cell.map(|v| closest[v as usize]);
                 bound_by_distances(&corners, &known) > limit
                     && !all_near_one_triangle(&corners, &known, to, limit)
+                    && !(patches.as_ref())
+                        .is_some_and(|patches| patches.cover(&corners, known[0].triangle, limit))
             })
             .collect();
         if cells.is_empty() {
@@ -199,6 +203,15 @@ fn farthest(
         points.extend(sides.iter().map(|side| side.middle));
         closest.extend(new);
     }
+}
+
+/// Triangles of a surface for one of a model at which few cells of the model are as small as its triangles: then patches
+/// decide too little for their time.
+const COARSE_MODEL_TRIANGLES: usize = 12;
+
+/// Whether patches of `to` decide about enough cells of `from`.
+fn is_fine(from: &TriMesh, to: &TriMesh) -> bool {
+    COARSE_MODEL_TRIANGLES * from.triangles.len() >= to.triangles.len()
 }
 
 /// A side of cells that are being cut.

@@ -36,6 +36,7 @@ pub mod measure;
 mod model_page;
 mod model_report;
 mod page_parts;
+mod patches;
 mod perfusion_report;
 mod projections_report;
 mod raised_flag;
