@@ -79,6 +79,10 @@ impl ModelParameters {
         // method.
         let optimise = &mut draft.optimise;
         let mut usual_starts = usual_starts(draft.retile.points);
+        optimise.fit.rounds = optimise
+            .fit
+            .rounds
+            .min(most_fit_rounds(draft.retile.points));
         if draft.retile.method == Method::Paper {
             usual_starts = 1;
             draft.surface.denoise = Denoise::Off;
@@ -101,6 +105,16 @@ impl ModelParameters {
             retile: draft.retile,
             optimise: draft.optimise,
         })
+    }
+}
+
+/// The most rounds of the fit by default, for a model of `points` points: many points lie close to the surface after
+/// few rounds.
+fn most_fit_rounds(points: usize) -> usize {
+    match points {
+        0..600 => usize::MAX,
+        600..2000 => 8,
+        _ => 5,
     }
 }
 

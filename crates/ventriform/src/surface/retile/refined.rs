@@ -41,6 +41,10 @@ const COARSE_TO_FINE_FROM: usize = 600;
 
 /// Share of the rounds of relaxation on seeds from relaxed cells: they are regular at the start.
 const ROUNDS_SHARE_AFTER_SPLIT: f64 = 0.3;
+/// The same of many points, from [`MANY_POINTS`] on: further rounds make their triangles no more regular.
+const ROUNDS_SHARE_OF_MANY: f64 = 0.14;
+/// Number of points from which on they are many.
+const MANY_POINTS: usize = 2000;
 
 /// Rounds of relaxation after a repair.
 const SETTLING_ROUNDS: usize = 20;
@@ -261,7 +265,11 @@ impl<'a> RefinedRun<'a> {
     ) -> Result<Cells, RetileError> {
         let all = self.parameters.relaxation_iterations;
         let exact = self.parameters.exact_rounds;
-        let share = ROUNDS_SHARE_AFTER_SPLIT;
+        let share = if self.points < MANY_POINTS {
+            ROUNDS_SHARE_AFTER_SPLIT
+        } else {
+            ROUNDS_SHARE_OF_MANY
+        };
         let after_split = |rounds: usize| (rounds as f64 * share).ceil() as usize;
         let mut numbers = self.coarse_to_fine();
         let fewest = numbers.pop().unwrap_or(self.points);
