@@ -405,6 +405,7 @@ impl Bvh {
     }
 
     /// The closest point on the triangle in a slot.
+    #[inline]
     fn closest_in(&self, slot: usize, p: &Vec3) -> Closest {
         let [a, b, c] = &self.corners[slot];
         let [u, v, w] = triangle::closest_barycentric(p, a, b, c);

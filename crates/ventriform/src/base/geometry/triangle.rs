@@ -37,6 +37,7 @@ pub fn angle_between(n0: &Vec3, n1: &Vec3) -> f64 {
 
 /// The barycentric coordinates of the point of triangle `a b c` that is closest to `p`
 /// (Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5).
+#[inline]
 pub fn closest_barycentric(p: &Vec3, a: &Vec3, b: &Vec3, c: &Vec3) -> [f64; 3] {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
