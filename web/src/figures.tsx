@@ -25,6 +25,18 @@ export interface Figure {
 /** The rows of a report, or of a part of one, by the name of its schema. */
 export const rowsOf = (schema: keyof typeof FIGURES): Figure[] => FIGURES[schema];
 
+/** Whether the short name is made of initials. */
+const isAbbreviated = ({ short }: Figure) => /^[A-Z]{2,}$/.test(short ?? "");
+
+/** What a figure is, with its name where the head has only initials. */
+export const meaningOf = (row: Figure): string => (isAbbreviated(row) ? `${row.label}. ${row.about}` : row.about);
+
+/** What the initials mean by which figures are headed. */
+export function abbreviations(): Map<string, string> {
+  const rows = [...rowsOf("ComparisonReport"), ...rowsOf("BeatReport")].filter(isAbbreviated);
+  return new Map(rows.map(row => [row.short!, meaningOf(row)]));
+}
+
 function at(report: unknown, place: string): unknown {
   return place.split("/").reduce<unknown>((part, name) => (part as Record<string, unknown> | null)?.[name], report);
 }
@@ -84,7 +96,7 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [],
         <tr>
           <th scope="col">{head}</th>
           {columns.map(row => (
-            <th key={row.place} scope="col" title={row.about}>
+            <th key={row.place} scope="col" title={meaningOf(row)}>
               {headOf(row)}
             </th>
           ))}

@@ -1,5 +1,6 @@
 // Links to results, with their leading figures.
 
+import { Abbreviation } from "./abbreviation";
 import type { Result } from "./api";
 import { newerCorrections } from "./corrections";
 import { ReadMark } from "./readmark";
@@ -39,9 +40,19 @@ function figures(result: Result) {
     return (
       <>
         <span>
-          TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}
-          {sss != null && `, SSS ${sss}, SDS ${sds}`}
-          {change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}
+          <Abbreviation>TID</Abbreviation> {number(summary.tid, 2)}, reversible{" "}
+          {number(summary.reversible_percent, 0, "%")}
+          {sss != null && (
+            <>
+              , <Abbreviation>SSS</Abbreviation> {sss}, <Abbreviation>SDS</Abbreviation> {sds}
+            </>
+          )}
+          {change != null && (
+            <>
+              , <Abbreviation>EF</Abbreviation> {change > 0 && "+"}
+              {number(change, 0, "points")}
+            </>
+          )}
         </span>
         <Doubts count={summary.flags?.length ?? 0} />
       </>
@@ -67,8 +78,8 @@ function figures(result: Result) {
     return (
       <>
         <span>
-          EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV{" "}
-          {number(summary.esv_ml, 0, "ml")}
+          <Abbreviation>EF</Abbreviation> {number(summary.ef_percent, 0, "%")}, <Abbreviation>EDV</Abbreviation>{" "}
+          {number(summary.edv_ml, 0, "ml")}, <Abbreviation>ESV</Abbreviation> {number(summary.esv_ml, 0, "ml")}
         </span>
         <Doubts count={summary.flags?.length ?? 0} />
       </>

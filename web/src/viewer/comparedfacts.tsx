@@ -10,6 +10,7 @@ import {
   figureOf,
   flatName,
   intervalOf,
+  meaningOf,
   rowsOf,
   verdictOf,
   written,
@@ -34,7 +35,7 @@ export function headlinesOf(report: ComparisonReport): [string, string, string, 
       [beside[row.place], intervalOf(row, report) && `90 %: ${intervalOf(row, report)}`, verdictOf(row, report)]
         .filter(Boolean)
         .join("; "),
-      row.about,
+      meaningOf(row),
     ]);
 }
 

@@ -1,6 +1,7 @@
 // Scores of the 17 segments: a reader's beside the automatic ones, with sums and differences.
 
 import { useRef } from "preact/hooks";
+import { Abbreviation } from "../abbreviation";
 import { type ReadingDraft, type Scored, type ScoredScan, exceeds, sumOf } from "../reading";
 
 const HEADS: Record<ScoredScan, string> = { stress: "Stress", rest: "Rest", scan: "Score" };
@@ -30,6 +31,7 @@ export function ScoreTable({ scans, segments, scores, onScore }: Props) {
     cell?.select();
   };
   const both = scans.length > 1;
+  const sums = [...scans.map(({ scan }) => SUMS[scan]), ...(both ? ["SDS"] : [])];
   const readAt = (scan: ScoredScan, row: number) => scores[scan]?.[row] ?? 0;
   return (
     <table class="scores" ref={table}>
@@ -81,8 +83,7 @@ export function ScoreTable({ scans, segments, scores, onScore }: Props) {
       <tfoot>
         <tr>
           <th scope="row">
-            {scans.map(({ scan }) => SUMS[scan]).join(", ")}
-            {both && ", SDS"}
+            {sums.map((name, at) => [at > 0 && ", ", <Abbreviation key={name}>{name}</Abbreviation>])}
           </th>
           {scans.map(({ scan, automatic }) => [
             <td key={scan}>

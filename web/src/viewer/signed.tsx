@@ -1,6 +1,7 @@
 // A signed reading: who read when, its files, and how far its structured report is on the way to the archive.
 
 import { useEffect, useState } from "preact/hooks";
+import { Abbreviation } from "../abbreviation";
 import { type Job, type Result, type Volume, call, get, page, save, words } from "../api";
 import { fileNameOf } from "../bundle";
 import type { ObjectDelivery } from "../generated/openapi";
@@ -20,15 +21,22 @@ interface Props {
 
 export function SignedReading({ reading, volume }: Props) {
   const { sss, srs, sds, quality } = reading.summary;
+  const sums = { SSS: sss, SRS: srs, SDS: sds };
   const scores = [
-    sds == null ? sss != null && `sum ${sss}` : `SSS ${sss}, SRS ${srs}, SDS ${sds}`,
+    sds == null
+      ? sss != null && `sum ${sss}`
+      : Object.entries(sums).map(([name, sum], at) => [
+          at > 0 && ", ",
+          <Abbreviation key={name}>{name}</Abbreviation>,
+          ` ${sum}`,
+        ]),
     quality && `quality ${quality}`,
   ].filter(Boolean);
   return (
     <div class="signed">
       <p role="status">
         <b>{readBy(reading)}</b>
-        {scores.length > 0 && <span class="quiet"> {scores.join("; ")}</span>}
+        {scores.length > 0 && <span class="quiet"> {scores.map((score, at) => [at > 0 && "; ", score])}</span>}
       </p>
       <ReadingFiles reading={reading} volume={volume} />
       <Deliveries reading={reading} />
