@@ -176,10 +176,23 @@ async function pageOf<T>(kind: string, answer: Response): Promise<Page<T>> {
   return { items: body[kind] as T[], next, etag: answer.headers.get("etag") ?? "" };
 }
 
-/** What is wrong and what to do; the names that the service puts between backticks stand for themselves. */
-export function sentences({ detail, fix }: Pick<Problem, "detail" | "fix">): [string, string] {
+/** Whether no heart was found: a person can show it in the picture. */
+export function isNoHeart({ type }: Pick<Problem, "type">): boolean {
+  return type.endsWith(":no-heart");
+}
+
+/**
+ * What is wrong and what to do; the names that the service puts between backticks stand for themselves. Programs are told
+ * where a heart was looked for, and are asked where it is, in millimetres; people see it.
+ */
+export function sentences({ type, detail, fix }: Pick<Problem, "type" | "detail" | "fix">): [string, string] {
   const plain = (text: string) => text.replaceAll("`", "");
-  return [plain(detail), plain(fix ?? "")];
+  if (!isNoHeart({ type })) return [plain(detail), plain(fix ?? "")];
+  const check = plain(fix ?? "").replace(/; if it is, .*$/, ".");
+  return [
+    plain(detail).replace(/, at \[[^\]]*\] mm \(LPS\),/, ""),
+    `${check} If it is, put its centre and apex in the picture.`.trim(),
+  ];
 }
 
 export function words(error: unknown): string {

@@ -1,7 +1,7 @@
 // One job: its state while it lasts, and why it failed.
 
 import { useState } from "preact/hooks";
-import { type Job, type Parameters, type Problem, sentences, words } from "./api";
+import { type Job, type Parameters, type Problem, isNoHeart, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
 import { open, openComparison, openResult, openSerial } from "./route";
 import { ordinal, stage } from "./words";
@@ -15,6 +15,11 @@ const KINDS: Record<Job["kind"], string> = {
   normals: "Normal limits",
   reading: "Reading",
 };
+
+/** Whether a fit failed that is fitted again from where a person shows the heart. */
+export function asksForHeart({ kind, error }: Pick<Job, "kind" | "error">): boolean {
+  return (kind === "segmentation" || kind === "beat") && error != null && isNoHeart(error);
+}
 
 /** What is wrong, and what to do. */
 export function Trouble({ problem }: { problem: Problem | null | undefined }) {
@@ -67,7 +72,7 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
           <>
             {job.kind !== "normals" && (
               <button type="button" onClick={change}>
-                Change and retry
+                {asksForHeart(job) ? "Put centre and apex" : "Change and retry"}
               </button>
             )}
             <button type="button" class="plain" onClick={act(() => forget(job))}>

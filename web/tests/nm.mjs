@@ -1,6 +1,6 @@
 // DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO),
 // or a PET series of one file for each slice. The same scan as header and image, as gates of a beat, and small volumes
-// for a long list.
+// for a long list. A scan without a heart.
 
 import { gunzipSync, gzipSync } from "node:zlib";
 
@@ -301,5 +301,30 @@ export function small(n) {
   file.writeFloatLE(352, 108);
   file.write("n+1\0", 344, "latin1");
   for (let at = 0; at < 64 * shape[2]; at++) file.writeInt16LE(n + at, 352 + 2 * at);
+  return file;
+}
+
+/** A NIfTI-1 file of a scan that shows no heart: a warm chest with one hot ball. */
+export function heartless() {
+  const [shape, spacing] = [[48, 48, 40], 6.4];
+  const file = Buffer.alloc(352 + 2 * shape[0] * shape[1] * shape[2]);
+  file.writeInt32LE(348, 0);
+  [3, ...shape, 1, 1, 1, 1].forEach((size, at) => file.writeInt16LE(size, 40 + 2 * at));
+  file.writeInt16LE(4, 70);
+  file.writeInt16LE(16, 72);
+  [1, spacing, spacing, spacing].forEach((mm, at) => file.writeFloatLE(mm, 76 + 4 * at));
+  file.writeFloatLE(352, 108);
+  file[123] = 2;
+  file.writeInt16LE(1, 254);
+  [0, 1, 2].forEach(row => file.writeFloatLE(spacing, 280 + 20 * row));
+  file.write("n+1\0", 344, "latin1");
+  const [nx, ny] = shape;
+  for (let at = 0; 352 + 2 * at < file.length; at++) {
+    const [x, y, z] = [at % nx, Math.floor(at / nx) % ny, Math.floor(at / nx / ny)];
+    const chest = ((x - 24) / 22) ** 2 + ((y - 24) / 17) ** 2 < 1 ? 40 : 0;
+    const ball = 400 * Math.exp(-((x - 16) ** 2 + (y - 26) ** 2 + (z - 10) ** 2) / 40);
+    // Counts differ from voxel to voxel.
+    file.writeInt16LE(Math.round((chest + ball) * (1 + 0.3 * Math.sin(7 * at * at))), 352 + 2 * at);
+  }
   return file;
 }

@@ -14,7 +14,7 @@ import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
-import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
+import { gated, gatedNm, heartless, nm, pair, series, small } from "./nm.mjs";
 import { readings } from "./reading.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 import { serials } from "./serial.mjs";
@@ -570,6 +570,49 @@ async function main() {
       assert.match(await line.textContent(), /patient ID 1\.2\.840\.113619\.2[.\d]*…/);
       assert.ok((await line.getAttribute("title")).includes(id));
       await look(page, `reader-list-${name}`);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
+  });
+
+  await check("where no heart is found, the picture asks for it", async () => {
+    const own = await service();
+    const path = join(SCREENSHOTS, "heartless.nii");
+    writeFileSync(path, heartless());
+    for (const [width, dark] of [
+      [1280, false],
+      [390, true],
+    ]) {
+      const { page, faults, close } = await tab(browser, own.address, { width, dark });
+      if (width === 1280) {
+        await page.waitForSelector(".welcome");
+        await choose(page, path);
+      }
+      const failed = page.locator(".job.failed").first();
+      await failed.waitFor();
+      const said = await failed.textContent();
+      assert.match(said, /No heart found.*put its centre and apex in the picture/);
+      assert.doesNotMatch(said, /LPS|millimetres/);
+      await failed.getByRole("button", { name: "Put centre and apex" }).click();
+      await page.waitForSelector(".correction");
+      await page.waitForSelector(".slice canvas");
+      await page.getByText("to the middle of the cavity").waitFor();
+      await look(page, `no-heart-${width}`);
+      if (width === 1280) {
+        // A press leads there, the centre follows; the handles stand in the slices.
+        const slice = page.locator(".slice canvas").first();
+        const { width: across, height: down } = await slice.boundingBox();
+        await slice.click({ position: { x: 0.6 * across, y: 0.4 * down } });
+        await page.getByRole("button", { name: "Centre at the cursor" }).click();
+        const wanted = page.waitForRequest(
+          request => request.url().endsWith("/v1/jobs") && request.method() === "POST",
+        );
+        await page.getByRole("button", { name: "Fit from here" }).click();
+        const order = (await wanted).postDataJSON();
+        assert.equal(order.kind, "segmentation");
+        assert.equal(order.parameters.center.length, 3);
+      }
       assert.deepEqual(faults, []);
       await close();
     }

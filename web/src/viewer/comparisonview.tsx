@@ -2,7 +2,7 @@
 // walls, and what they say in figures.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Parameters, type Result, type Volume, get, words } from "../api";
+import { type Job, type Parameters, type Result, type Volume, get, isNoHeart, words } from "../api";
 import { Confirm } from "../confirm";
 import { comparisons, eraseResult, find, loadResult, loadResultsOf } from "../library";
 import { PairForm } from "../pairform";
@@ -72,14 +72,28 @@ function PairAgain({ job }: { job: Job }) {
     );
   }, [job.id]);
   if (!again) return null;
+  const [stress, rest] = again.pair;
   return (
-    <PairForm
-      pair={again.pair}
-      stress={again.pair[0].id}
-      draft={again.draft}
-      problem={again.problem}
-      otherPatient={isOfOtherPatient(job)}
-    />
+    <>
+      {job.error && isNoHeart(job.error) && (
+        <p>
+          Open the scan{" "}
+          {job.error.detail.startsWith("rest") ? (
+            <a href={`#/scan/${rest.id}`}>at rest</a>
+          ) : (
+            <a href={`#/scan/${stress.id}`}>at stress</a>
+          )}{" "}
+          and press <b>Correct by hand</b>. What is fitted there is taken here.
+        </p>
+      )}
+      <PairForm
+        pair={again.pair}
+        stress={stress.id}
+        draft={again.draft}
+        problem={again.problem}
+        otherPatient={isOfOtherPatient(job)}
+      />
+    </>
   );
 }
 

@@ -92,11 +92,18 @@ export function Correction({ scene, volume, shown }: Props) {
   };
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
-      <p class="quiet">
-        Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so
-        that it points to the anterior wall: turning only renames segments.{" "}
-        {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.
-      </p>
+      {shown ? (
+        <p class="quiet">
+          Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so
+          that it points to the anterior wall: turning only renames segments.{" "}
+          {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.
+        </p>
+      ) : (
+        <p class="quiet">
+          Drag <b>centre</b> to the middle of the cavity, <b>apex</b> to its tip and <b>base</b> to the valve plane. A
+          press beside them goes to other slices; <b>Centre at the cursor</b> brings all three there.
+        </p>
+      )}
       <EditFields
         edit={edit}
         onEdit={next => (scene.edit.value = next)}

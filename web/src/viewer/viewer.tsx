@@ -3,7 +3,7 @@
 import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Kind, type Parameters, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
-import { JobLine } from "../jobline";
+import { JobLine, asksForHeart } from "../jobline";
 import {
   beats,
   comparisons,
@@ -280,11 +280,12 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
     setTab("work");
     void parameterSpecs().then(specs => setDraft(draftOf(parameters as Parameters, specs[kind])));
   };
+  const mend = (failed: Job) => (asksForHeart(failed) ? setTab("correct") : repeat(failed));
   useEffect(() => {
     if (!retry) return;
     void get<Job>(`/v1/jobs/${retry}`).then(
       job => {
-        repeat(job);
+        mend(job);
         if (job.error)
           setProblem({
             field: job.error.field?.split(/[./]/).pop() ?? null,
@@ -371,7 +372,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
           .filter(job => job.state !== "succeeded")
           .slice(0, 5)
           .map(job => (
-            <JobLine key={job.id} job={job} onChange={repeat} />
+            <JobLine key={job.id} job={job} onChange={mend} />
           ))}
       </section>
       {readable && <ReadingPanel key={readable.result.id} readable={readable} volume={volume} />}
