@@ -5,6 +5,7 @@ import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
 import { correctedWords } from "./comparedcorrection";
 import {
+  BothMeasures,
   Headlines,
   Outdated,
   LimitsUsed,
@@ -93,6 +94,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
       </div>
       <Outdated made={result} />
       <Headlines report={report} />
+      <BothMeasures report={report} />
       <Drawn
         width={WIDTH}
         height={HEIGHT}
