@@ -28,7 +28,7 @@ export default defineConfig(({ mode }) =>
         base: "./",
         esbuild,
         server: {
-          proxy: { "/v1": service, "/openapi.json": service, "/docs": service },
+          proxy: { "/v1": service, "/examples": service, "/openapi.json": service, "/docs": service },
           fs: { allow: [".", "../crates/ventriform/assets"] },
         },
         build: {

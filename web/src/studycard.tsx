@@ -8,6 +8,7 @@ import { volumes } from "./library";
 import { type Pairing, type StudyPair, earlierStudies, picked, studyKey } from "./pairing";
 import { ComparisonLink } from "./resultlink";
 import { loadCompany } from "./scanlist";
+import { SimulatedMark } from "./simulatedmark";
 import { useWatched } from "./state";
 import { cut, isoDay, study } from "./words";
 import { OverTheYears } from "./yearscard";
@@ -44,7 +45,7 @@ export function StudyCard({ name, scans, pairing: { pairs, unpaired }, compared,
     <li class="study" data-study={name}>
       <div class="study-head">
         <h2 tabIndex={-1} title={study(first)}>
-          {study(first, cut) || "One study"}
+          {study(first, cut) || "One study"} <SimulatedMark of={first} />
         </h2>
         {others.map(made => (
           <ComparisonLink key={made.id} made={made} />

@@ -28,6 +28,8 @@ export interface Upload {
   /** The number of what was chosen or dropped together. */
   batch: number;
   group: Group;
+  /** Whether it is an example of the service: nothing has to be decided about it. */
+  isExample: boolean;
   bytes: number;
   sent: number;
   state: UploadState;
@@ -46,9 +48,11 @@ keepNames.watch(() => localStorage.setItem("ventriform.names", keepNames.value ?
 export const uploads = new Watched<Upload[]>([]);
 
 /** What to do with each scan that has been stored, and with those that were sent together once all of them are. */
-let whenStored: (volume: Volume) => void = () => undefined;
-let whenAllStored: (volumes: Volume[]) => void = () => undefined;
-export function onStored(act: (volume: Volume) => void, together: (volumes: Volume[]) => void): void {
+type WhenStored = (volume: Volume, upload: Upload) => void;
+type WhenAllStored = (volumes: Volume[], areExamples: boolean) => void;
+let whenStored: WhenStored = () => undefined;
+let whenAllStored: WhenAllStored = () => undefined;
+export function onStored(act: WhenStored, together: WhenAllStored): void {
   whenStored = act;
   whenAllStored = together;
 }
@@ -178,13 +182,14 @@ uploads.watch(() => {
 let count = 0;
 let batches = 0;
 
-export async function add(files: File[]): Promise<void> {
+export async function add(files: File[], isExample = false): Promise<void> {
   const groups = await grouped(files);
   const batch = ++batches;
   const made = groups.map(group => ({
     id: ++count,
     batch,
     group,
+    isExample,
     bytes: group.files.reduce((sum, file) => sum + file.size, 0),
     sent: 0,
     state: "waiting" as const,
@@ -260,7 +265,7 @@ async function send(upload: Upload): Promise<void> {
       const volume = JSON.parse(answer.text) as Volume;
       rememberFileName(volume, upload.group.name);
       change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
-      whenStored(volume);
+      whenStored(volume, upload);
     } else {
       change(upload.id, { state: "refused", problem: problemOf(answer.status, answer.text) });
     }
@@ -273,7 +278,11 @@ async function send(upload: Upload): Promise<void> {
 function tellTogether(batch: number): void {
   const together = uploads.value.filter(other => other.batch === batch);
   const scans = together.filter(other => !isForeign(other));
-  if (scans.every(other => other.state === "stored")) whenAllStored(scans.flatMap(other => other.volume ?? []));
+  if (scans.every(other => other.state === "stored"))
+    whenAllStored(
+      scans.flatMap(other => other.volume ?? []),
+      scans.some(other => other.isExample),
+    );
 }
 
 /** One request; null if it was cancelled or interrupted. Only XMLHttpRequest reports how much was sent. */

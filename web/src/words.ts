@@ -70,6 +70,12 @@ export function study({ dicom }: Volume, written: (text: string) => string = tex
   return parts.filter(Boolean).join(" · ");
 }
 
+/** Whether a scan says that its patient is simulated: by the name, or by its description where it has no name. */
+export function isOfSimulated({ dicom }: Volume): boolean {
+  const name = dicom?.["patient_name"];
+  return name ? name.startsWith("Simulated^") : /\bsimulated\b/i.test(dicom?.series_description ?? "");
+}
+
 /** What a header says of the acquisition: stress or rest, its description, the tracer. */
 export function acquisition({ dicom }: Volume): string[] {
   if (!dicom) return [];

@@ -4,6 +4,7 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
+import { Examples } from "./examples";
 import { JobLine } from "./jobline";
 import {
   beats,
@@ -23,11 +24,11 @@ import {
   trouble,
   volumes,
 } from "./library";
-import { byStudy, offeredPair, pairsOf, pick, picked, statedRole, studyKey } from "./pairing";
+import { byStudy, offeredPair, pairsOf, pick, picked, statedRole, stressOf, studyKey } from "./pairing";
 import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
 import { ComparisonLink, ResultLink, SerialLink } from "./resultlink";
-import { open, route } from "./route";
+import { open, openComparison, route } from "./route";
 import { toldOf } from "./scankind";
 import {
   type Asked,
@@ -46,9 +47,10 @@ import {
   receiving,
   watchList,
 } from "./scanlist";
+import { SimulatedMark } from "./simulatedmark";
 import { useWatched } from "./state";
 import { StudyCard } from "./studycard";
-import { add, keepNames, onStored, uploads } from "./upload";
+import { type Upload, add, keepNames, onStored, uploads } from "./upload";
 import { Uploads } from "./uploadlist";
 import {
   acquisition,
@@ -64,12 +66,28 @@ import {
   titleOf,
   wasSentAs,
 } from "./words";
-import { file } from "./work";
+import { file, fileComparison } from "./work";
 
 type Then = "fit" | "model" | "nothing";
 
 /** The kind of fit for a scan: its gates are fitted together. */
 const fitOf = (volume: Volume) => (isGated(volume) ? "beat" : "segmentation");
+
+/** Whether it is all that this tab has sent, or all of an example. */
+function isAlone({ isExample, batch }: Upload): boolean {
+  const all = uploads.value.filter(upload => !isExample || upload.batch === batch);
+  return all.length === 1 && all.every(upload => upload.state === "stored");
+}
+
+/** Compares the two scans of an example, which say what they are. The comparison waits for no beat, so those come after. */
+async function compareExample(pair: [Volume, Volume]): Promise<void> {
+  const { stress } = stressOf(...pair);
+  const [atStress, atRest] = stress === pair[1] ? [pair[1], pair[0]] : pair;
+  const none = { fits: { stress: null, rest: null }, normals: null, parameters: {} };
+  const job = await fileComparison({ stress: atStress, rest: atRest, ...none });
+  if (route.value.view === "list") openComparison(job.id);
+  for (const volume of [atStress, atRest]) await file(fitOf(volume), volume, {});
+}
 
 const THEN = "ventriform.then";
 /** Pause after the last letter before a search is asked for, ms. */
@@ -81,19 +99,22 @@ export function WorkList() {
   useEffect(() => {
     localStorage.setItem(THEN, then);
     onStored(
-      volume => {
+      (volume, upload) => {
         addStored(volume);
         if (then === "nothing" || isLabelMap(volume)) return;
-        const alone =
-          uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
+        const alone = isAlone(upload);
+        // The scans of an example that has several are compared before each is fitted.
+        if (upload.isExample && !alone) return;
         file(then === "model" ? "model" : fitOf(volume), volume, {}).then(
           () => alone && route.value.view === "list" && open(volume.id),
           error => setMessage(words(error)),
         );
       },
-      together => {
+      (together, areExamples) => {
         const pair = offeredPair(together);
-        if (pair) picked.value = pair.map(volume => volume.id);
+        if (!pair) return;
+        if (areExamples && then !== "nothing") compareExample(pair).catch(error => setMessage(words(error)));
+        else picked.value = pair.map(volume => volume.id);
       },
     );
   }, [then]);
@@ -247,9 +268,8 @@ function Scans() {
             is reversible, TID.
           </li>
         </ol>
-        <p class="quiet">
-          No scan at hand? <code>ventriform phantom</code> simulates one.
-        </p>
+        <h2 class="aside">No scan at hand? Try a simulated one:</h2>
+        <Examples />
       </section>
     );
   }
@@ -354,6 +374,10 @@ function Tools({ count }: { count: string }) {
             No filter
           </button>
         )}
+      </details>
+      <details class="filters">
+        <summary>Try an example</summary>
+        <Examples />
       </details>
       <span class="quiet" role="status">
         {count}
@@ -478,6 +502,7 @@ function ScanRow({
             {cut(titleOf(volume))}
           </a>
           {role && <span class={`role ${role}`}>{role}</span>}
+          {alone && <SimulatedMark of={volume} />}
         </span>
         {alone && study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
         {described && <span>{described}</span>}

@@ -14,6 +14,7 @@ import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
+import { examples } from "./examples.mjs";
 import { gated, gatedNm, heartless, nm, pair, series, small } from "./nm.mjs";
 import { readings } from "./reading.mjs";
 import { reports, samePolarMap } from "./report.mjs";
@@ -671,6 +672,7 @@ async function main() {
   });
 
   const tools = { PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose };
+  await examples(tools);
   await comparisons(tools);
   await studies(tools);
   await serials(tools);

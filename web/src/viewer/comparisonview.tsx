@@ -8,6 +8,7 @@ import { comparisons, eraseResult, find, loadResult, loadResultsOf } from "../li
 import { PairForm } from "../pairform";
 import { type Draft, draftOf, parameterSpecs } from "../parameters";
 import { home } from "../route";
+import { SimulatedMark } from "../simulatedmark";
 import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
@@ -183,7 +184,7 @@ function Head({ compared, scans, scene }: ComparisonProps & { scene: ComparedSce
       <h1>Rest and stress</h1>
       {study(scans.stress) && (
         <p>
-          <b>{study(scans.stress)}</b>
+          <b>{study(scans.stress)}</b> <SimulatedMark of={scans.stress} />
         </p>
       )}
       {(["stress", "rest"] as const).map(scan => (

@@ -9,6 +9,7 @@ import { type Draft, draftOf, parameterSpecs } from "../parameters";
 import { resultName } from "../resultnames";
 import { home } from "../route";
 import { SerialForm } from "../serialform";
+import { SimulatedMark } from "../simulatedmark";
 import { useWatched } from "../state";
 import { moment, study } from "../words";
 import { Reasons, areNotComparable } from "./comparedfacts";
@@ -61,7 +62,7 @@ function Serial({ series }: { series: Series }) {
           <h1>{TITLE}</h1>
           {last && study(last) && (
             <p>
-              <b>{study(last)}</b>
+              <b>{study(last)}</b> <SimulatedMark of={last} />
             </p>
           )}
         </header>

@@ -26,6 +26,7 @@ import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "..
 import { ReadMark } from "../readmark";
 import { nameAmong, resultName, timeOf } from "../resultnames";
 import { home, isAt, open, openComparison, openSerial, route } from "../route";
+import { SimulatedMark } from "../simulatedmark";
 import { useWatched } from "../state";
 import { file, isFiledHere } from "../work";
 import { isBeat, isFit, isGated, kindOf, moment, nameOf, shape, study, titleOf } from "../words";
@@ -319,7 +320,11 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
     <aside class="side" aria-label="Scan and work">
       <header>
         <h1>{titleOf(volume)}</h1>
-        {study(volume) && <p>{study(volume)}</p>}
+        {study(volume) && (
+          <p>
+            {study(volume)} <SimulatedMark of={volume} />
+          </p>
+        )}
         <p class="quiet">
           {volume.format}, {shape(volume)}
           <br />
