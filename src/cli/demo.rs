@@ -138,23 +138,24 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
     say!("Sending four simulated scans of three patients ...");
     let [scan, gated, stress, rest] = stored(&remote).await?;
 
-    let of = |volume: &str| json!({"volume": volume});
     let fit = json!({"volume": scan, "kind": "segmentation"});
     let fit = remote.result("/v1/jobs", fit).await?;
-    let mut beats = Vec::new();
-    for volume in [&gated, &stress, &rest] {
-        let mut order = of(volume);
-        order["kind"] = "beat".into();
-        beats.push(remote.result("/v1/jobs", order).await?);
-    }
+    let beat = json!({"volume": gated, "kind": "beat"});
+    let beat = remote.result("/v1/jobs", beat).await?;
     let pair = json!({"stress": stress, "rest": rest});
     let pair = remote.result("/v1/comparisons", pair).await?;
+    // The display shows the gates of both scans by beats of the heart that the comparison was made with.
+    let model = remote.json(&format!("{pair}/report")).await?["stress"]["template"].take();
+    for volume in [stress, rest] {
+        let order = json!({"volume": volume, "kind": "beat", "parameters": {"kept_model": model}});
+        remote.result("/v1/jobs", order).await?;
+    }
 
     create_folder(&args.output)?;
     let files = [
         (format!("{fit}/mesh.glb"), "lv.glb"),
         (format!("{fit}/report.html"), "segmentation.html"),
-        (format!("{}/report.html", beats[0]), "beat.html"),
+        (format!("{beat}/report.html"), "beat.html"),
         (format!("{pair}/report.html"), "comparison.html"),
     ];
     for (path, file) in &files {
@@ -163,7 +164,7 @@ async fn demonstrate(args: &DemoArgs, data_dir: &Path) -> Result<()> {
     say!("");
     for (title, path) in [
         ("One scan", &fit),
-        ("Gated", &beats[0]),
+        ("Gated", &beat),
         ("Stress and rest", &pair),
     ] {
         let report = remote.json(&format!("{path}/report")).await?;

@@ -79,14 +79,13 @@ function isAlone({ isExample, batch }: Upload): boolean {
   return all.length === 1 && all.every(upload => upload.state === "stored");
 }
 
-/** Compares the two scans of an example, which say what they are. The comparison waits for no beat, so those come after. */
+/** Compares the two scans of an example, which say what they are. Its view offers the beats, fitted by its own model. */
 async function compareExample(pair: [Volume, Volume]): Promise<void> {
   const { stress } = stressOf(...pair);
   const [atStress, atRest] = stress === pair[1] ? [pair[1], pair[0]] : pair;
   const none = { fits: { stress: null, rest: null }, normals: null, parameters: {} };
   const job = await fileComparison({ stress: atStress, rest: atRest, ...none });
   if (route.value.view === "list") openComparison(job.id);
-  for (const volume of [atStress, atRest]) await file(fitOf(volume), volume, {});
 }
 
 const THEN = "ventriform.then";

@@ -44,7 +44,7 @@ export async function examples({ PROGRAM, browser, service, tab, check, look }) 
       assert.match(await page.textContent(".verdict"), /% of the wall is reversible/);
       // Initials are spelled out.
       assert.match(await page.locator("dt", { hasText: "TID" }).getAttribute("title"), /ischaemic dilation/);
-      // The beats come by themselves.
+      await page.getByRole("button", { name: "Fit the beats" }).click();
       await page.waitForSelector(".compared-beat .volumes");
       await look(page, "example-comparison-1280");
       assert.deepEqual(faults, []);
