@@ -71,6 +71,17 @@ export function verdictOf(row: Figure, report: unknown): string {
   return typeof verdict === "string" ? verdict.replaceAll("_", " ") : "";
 }
 
+/** How sure the figure of a part is, as the tooltip of its cell; what certainly changed stands out. */
+function certaintyOf(row: Figure, part: unknown): { title?: string; class?: string } {
+  const verdict = verdictOf(row, part);
+  if (!verdict) return {};
+  const interval = intervalOf(row, part);
+  return {
+    title: `${interval && `${interval}; `}changed: ${verdict}`,
+    ...(verdict === "yes" ? { class: "changed" } : {}),
+  };
+}
+
 const headOf = ({ label, short, unit }: Figure) => `${short ?? label}${unit && `, ${unit}`}`;
 
 interface PartProps<Part> {
@@ -117,7 +128,9 @@ export function PartTable<Part>({ caption, head, parts, nameOf, rows, more = [],
             onClick={() => marks?.onPress(part)}>
             <th scope="row">{nameOf(part)}</th>
             {columns.map(row => (
-              <td key={row.place}>{written(row, figureOf(row, part), false)}</td>
+              <td key={row.place} {...certaintyOf(row, part)}>
+                {written(row, figureOf(row, part), false)}
+              </td>
             ))}
             {more.map(([name, of]) => (
               <td key={name}>{of(part)}</td>
