@@ -38,14 +38,14 @@ WIDE = (
 # Name: program of the simulator, seed, number, further flags. All held out.
 HELD_OUT = {
     "17001": ("cases", 17001, 230, ["--coarse", "--kinds", WIDE]),
-    "17002": ("cases", 17002, 46, ["--kinds", WIDE]),
+    "17002": ("cases", 17002, 23, ["--kinds", WIDE]),
     "17003": ("walls", 17003, 48, []),
     "variants": ("variants", None, None, []),
 }
-HELD_OUT_BEATS = {"17500": ("gated", 17500, 30, []), "17103": ("walls", 17103, 12, ["--gates", "8"])}
-HELD_OUT_PAIRS = {"17610": ("pairs", 17610, 30, ["--gates", "0"])}
+HELD_OUT_BEATS = {"17500": ("gated", 17500, 16, []), "17103": ("walls", 17103, 8, ["--gates", "8"])}
+HELD_OUT_PAIRS = {"17610": ("pairs", 17610, 20, ["--gates", "0"])}
 HELD_OUT_GATED_PAIRS = {
-    "17620": ("pairs", 17620, 12, ["--gates", "8", "--kinds", calibrate_all.KINDS_OF_GATED_PAIRS])
+    "17620": ("pairs", 17620, 8, ["--gates", "8", "--kinds", calibrate_all.KINDS_OF_GATED_PAIRS])
 }
 IN_SAMPLE = ["6003", "6007"]
 GOOD, BAD, ELSEWHERE_MM = 0.75, 0.65, 25.0
