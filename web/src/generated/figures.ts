@@ -262,6 +262,8 @@ export const FIGURES = {
       "about": "Motion inward at stress less that at rest.",
       "unit": "mm",
       "digits": 1,
+      "interval": "motion_change_interval_mm",
+      "verdict": "motion_change_verdict",
       "signed": true,
       "headline": true
     },
@@ -271,6 +273,8 @@ export const FIGURES = {
       "about": "Thickening at stress less that at rest.",
       "unit": "points",
       "digits": 0,
+      "interval": "thickening_change_interval_points",
+      "verdict": "thickening_change_verdict",
       "signed": true,
       "headline": true
     }
@@ -449,6 +453,8 @@ export const FIGURES = {
       "digits": 0,
       "short": "EF change",
       "section": "The beat at stress and at rest",
+      "interval": "beat/ef_change_interval_points",
+      "verdict": "beat/ef_change_verdict",
       "signed": true,
       "code": "EF-CHANGE, 99VENTRIFORM"
     },
@@ -483,6 +489,28 @@ export const FIGURES = {
       "unit": "ml",
       "digits": 0,
       "section": "The beat at stress and at rest"
+    },
+    {
+      "place": "beat/edv_change_ml",
+      "label": "Change of the end-diastolic volume",
+      "about": "End-diastolic volume at stress less that at rest.",
+      "unit": "ml",
+      "digits": 0,
+      "section": "The beat at stress and at rest",
+      "interval": "beat/edv_change_interval_ml",
+      "verdict": "beat/edv_change_verdict",
+      "signed": true
+    },
+    {
+      "place": "beat/esv_change_ml",
+      "label": "Change of the end-systolic volume",
+      "about": "End-systolic volume at stress less that at rest.",
+      "unit": "ml",
+      "digits": 0,
+      "section": "The beat at stress and at rest",
+      "interval": "beat/esv_change_interval_ml",
+      "verdict": "beat/esv_change_verdict",
+      "signed": true
     },
     {
       "place": "compared_percent",

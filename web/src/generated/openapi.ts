@@ -137,11 +137,30 @@ export interface components {
         };
         /** @description What changed of the beat from rest to stress. */
         BeatChange: {
+            /** @description Its interval. */
+            edv_change_interval_ml?: number[] | null;
+            /**
+             * Format: double
+             * @description Change of the end-diastolic volume from rest to stress.
+             */
+            edv_change_ml?: number | null;
+            edv_change_verdict?: components["schemas"]["Verdict"] | null;
+            /** @description Its interval. */
+            ef_change_interval_points?: number[] | null;
             /**
              * Format: double
              * @description Change from rest to stress, points.
              */
             ef_change_points?: number | null;
+            ef_change_verdict?: components["schemas"]["Verdict"] | null;
+            /** @description Its interval. */
+            esv_change_interval_ml?: number[] | null;
+            /**
+             * Format: double
+             * @description Change of the end-systolic volume.
+             */
+            esv_change_ml?: number | null;
+            esv_change_verdict?: components["schemas"]["Verdict"] | null;
             /**
              * Format: double
              * @description End-diastolic volume at rest.
@@ -787,11 +806,14 @@ export interface components {
         };
         /** @description A segment at stress and at rest. */
         ComparedSegment: components["schemas"]["UptakeChange"] & {
+            /** @description Interval of that change: in nine of ten pairs such intervals hold all 17 changes together. */
+            motion_change_interval_mm?: number[] | null;
             /**
              * Format: double
              * @description Change of motion from rest to stress, mm; `null` unless both scans are gated.
              */
             motion_change_mm?: number | null;
+            motion_change_verdict?: components["schemas"]["Verdict"] | null;
             /** @description Its name. */
             name: string;
             /**
@@ -809,11 +831,14 @@ export interface components {
              * @description Score at stress, 0 to 4.
              */
             stress_score?: number | null;
+            /** @description Its interval, likewise. */
+            thickening_change_interval_points?: number[] | null;
             /**
              * Format: double
              * @description Change of thickening from rest to stress, points.
              */
             thickening_change_points?: number | null;
+            thickening_change_verdict?: components["schemas"]["Verdict"] | null;
         };
         /** @description The wall of an artery at stress and at rest. */
         ComparedTerritory: components["schemas"]["UptakeChange"] & {
@@ -1098,6 +1123,10 @@ export interface components {
             rest_base?: number[];
             /** @description A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart is searched for */
             rest_center?: number[];
+            /** @description Points that the wall's inner surface passes through in the scan at rest, x,y,z in LPS millimetres */
+            rest_inner_through?: number[];
+            /** @description Points that the wall's outer surface passes through in the scan at rest */
+            rest_outer_through?: number[];
             /**
              * @description The protocol of the scan at rest. Default: the only one with the word rest in its name
              * @example rest
@@ -1137,6 +1166,10 @@ export interface components {
             stress_base?: number[];
             /** @description A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart is searched for */
             stress_center?: number[];
+            /** @description Points that the wall's inner surface passes through in the scan at stress, x,y,z in LPS millimetres */
+            stress_inner_through?: number[];
+            /** @description Points that the wall's outer surface passes through in the scan at stress */
+            stress_outer_through?: number[];
             /**
              * @description The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word stress in its name
              * @example stress
@@ -2954,7 +2987,7 @@ export interface components {
              * @default 0.02
              */
             fit_peak_weight?: number;
-            /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, for paper: 0) */
+            /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, from 600 points on 8, from 2000 on 5; for paper: 0) */
             fit_rounds?: number;
             /**
              * @description Samples of the surface per triangle of the model in the fit; fewer, at least 6, where the surface's own triangles are larger
@@ -5183,6 +5216,8 @@ export interface components {
             filter_order?: number;
             /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
             frame?: number;
+            /** @description Points that the wall's inner surface, as it looks in the image, passes through: x,y,z in LPS millimetres, one point after the other. About each, the image's own edge is not followed */
+            inner_through?: number[];
             /**
              * @description Name (as in a report) of the fitted model to keep: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
              * @example built-in usual
@@ -5265,6 +5300,8 @@ export interface components {
              * @default 10
              */
             osem_subsets?: number;
+            /** @description Points that the wall's outer surface passes through, likewise */
+            outer_through?: number[];
             /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
