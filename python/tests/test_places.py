@@ -20,6 +20,7 @@ def test_every_place_of_the_tables_is_known() -> None:
             assert ("LPS" in row["summary"] and row["kind"] in ("numbers", "direction")) == _documents.is_place(
                 row["name"]
             ), row
+            assert (row["kind"] == "points") == _documents.are_points(row["name"]), row
     for function in (vf.segment, vf.beat, vf.compare):
         text = (function.__doc__ or "").partition("Parameters")[2].replace("in RAS and 0,-1,0 in LPS", "")
         of_meshes = [line for line in text.splitlines() if "LPS" in line and "SPACE" not in line and "mesh" not in line]
@@ -51,6 +52,26 @@ def test_what_a_report_says_can_be_given_back(scan: pathlib.Path, fit: vf.Fit, f
     assert again["base"].frame == frame
     repeated = vf.segment(volume, **{name: again[name] for name in ("base", "center")})
     assert dict(repeated.files) == dict(plain.files)
+
+
+def test_points_of_the_wall_go_in_by_the_frame_that_they_come_out_in(scan: pathlib.Path) -> None:
+    volume = vf.read(scan, frame="RAS")
+    plain = vf.segment(volume)
+    apex = np.array(plain.report.fit.long_axis.apex)  # type: ignore[union-attr]
+    base = np.array(plain.report.fit.long_axis.base)  # type: ignore[union-attr]
+    beyond = apex + 4 * (apex - base) / np.linalg.norm(apex - base)
+    pulled = vf.segment(volume, outer_through=[beyond])
+    assert np.linalg.norm(pulled.surface.vertices - beyond, axis=1).min() < 6
+    in_lps = vf.segment(volume.in_frame("LPS"), outer_through=beyond[None] * [-1, -1, 1])
+    assert dict(in_lps.files) == dict(pulled.files)
+    (stated,) = pulled.report.parameters["outer_through"]
+    assert stated.frame == "RAS" and np.allclose(stated, beyond)
+    again = vf.segment(volume, outer_through=pulled.report.parameters["outer_through"])
+    assert dict(again.files) == dict(pulled.files)
+    for wrong in (5, "1,2,3", [1, 2, 3], [[1, 2]]):
+        with pytest.raises(vf.InputError) as refused:
+            vf.segment(volume, outer_through=wrong)  # type: ignore[arg-type]
+        assert refused.value.field == "outer_through"
 
 
 def test_each_scan_of_a_comparison_has_its_frame(folder: pathlib.Path) -> None:

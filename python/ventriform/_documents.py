@@ -28,6 +28,9 @@ BOUNDS = ("max_mm", "min_mm")
 GIVEN_PLACES = ("center", "axis", "superior", "anterior", "segments_from", "base")
 """The parameters that are points or directions; those of one of two scans have its name before."""
 
+GIVEN_POINTS = ("inner_through", "outer_through")
+"""Those that are several points; the documents have their numbers one after the other."""
+
 
 def register(*classes: type[Document]) -> None:
     """Makes classes known by their names."""
@@ -36,7 +39,16 @@ def register(*classes: type[Document]) -> None:
 
 def is_place(parameter: str) -> bool:
     """Whether a parameter is a point or a direction in the patient."""
-    return parameter.removeprefix("stress_").removeprefix("rest_") in GIVEN_PLACES
+    return _of_any_scan(parameter) in GIVEN_PLACES
+
+
+def are_points(parameter: str) -> bool:
+    """Whether a parameter is several points in the patient."""
+    return _of_any_scan(parameter) in GIVEN_POINTS
+
+
+def _of_any_scan(parameter: str) -> str:
+    return parameter.removeprefix("stress_").removeprefix("rest_")
 
 
 class Document:
@@ -59,7 +71,7 @@ class Document:
             if plain in PLACES.get(cls.__name__, ()):
                 fields[name] = _placed(value, "LPS" if plain in BOUNDS else frame)
             elif plain == "parameters" and isinstance(value, dict):
-                fields[name] = {key: _placed(one, frame) if is_place(key) else one for key, one in value.items()}
+                fields[name] = {key: _given(key, one, frame) for key, one in value.items()}
             else:
                 fields[name] = _build(cls._built.get(plain, ""), value, frame)
         made = cls(**fields)
@@ -100,6 +112,13 @@ def _build(built: str, value: Any, frame: Frame) -> Any:
     if built.endswith("{}"):
         return {name: _build(built[:-2], one, frame) for name, one in value.items()}
     return _CLASSES[built].from_dict(value, frame=frame)
+
+
+def _given(parameter: str, value: Any, frame: Frame) -> Any:
+    """A parameter's value, points and directions in `frame`."""
+    if are_points(parameter) and isinstance(value, list):
+        return [_placed(value[at : at + 3], frame) for at in range(0, len(value), 3)]
+    return _placed(value, frame) if is_place(parameter) else value
 
 
 def _placed(value: Any, frame: Frame) -> Any:

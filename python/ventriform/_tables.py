@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 from . import _native, _objects
-from ._documents import is_place
+from ._documents import are_points, is_place
 from ._errors import InputError
 from ._frames import Coordinates, Frame, turned
 
@@ -20,6 +20,7 @@ _TABLES: dict[str, list[Row]] = {**_native.parameter_tables(), "dicom": _objects
 
 #: How the tables say LPS, and what it is in Python.
 IN_FRAME = (
+    ("x,y,z in LPS millimetres, one point after the other", "x,y,z in millimetres of the scan's patient frame"),
     ("in the LPS frame of the volume", "in the scan's patient frame"),
     ("often 0,-1,0:", "often 0,1,0 in RAS and 0,-1,0 in LPS:"),
     ("in LPS millimetres", "in millimetres of the scan's patient frame"),
@@ -66,6 +67,8 @@ def annotation(row: Row) -> str:
         made = "Sequence[int]"
     elif kind == "numbers":
         made = "Sequence[float]"
+    elif kind == "points":
+        made = "Sequence[Sequence[float]]"
     elif kind == "string":
         made = "str"
     elif kind == "time":
@@ -94,6 +97,8 @@ def values(row: Row) -> str:
     if kind in ("integers", "numbers"):
         word = "int" if kind == "integers" else "float"
         return word if row["count"] == 1 else f"{row['count']} {word}s"
+    if kind == "points":
+        return f"1 to {row['most']} points of 3 floats"
     if kind == "time":
         return f"str or datetime, such as {row['example']}"
     return f"str, such as {row['example']}"
@@ -130,7 +135,22 @@ def to_lps(command: str, parameters: dict[str, Any], frame_for: Callable[[str], 
         name = row["name"]
         if is_place(name) and made.get(name) is not None:
             made[name] = _placed(name, made[name], frame_for)
+        if are_points(name) and made.get(name) is not None:
+            made[name] = _flat(name, made[name], frame_for)
     return made
+
+
+def _flat(name: str, points: Any, frame_for: Callable[[str], Frame]) -> list[float]:
+    """The numbers of points, one after the other."""
+    fix = "Give a list of points, each of 3 numbers x, y, z."
+    try:
+        placed = [_placed(name, point, frame_for) for point in points]
+        lengths = [len(point) for point in placed]
+    except TypeError as error:
+        raise InputError(name, f"It is no list of points: {error}.", fix) from error
+    if isinstance(points, str) or any(length != 3 for length in lengths):
+        raise InputError(name, "Its points have not 3 numbers each.", fix)
+    return [number for point in placed for number in point]
 
 
 def _placed(name: str, value: Any, frame_for: Callable[[str], Frame]) -> Any:

@@ -71,8 +71,24 @@ class BeatChange(Document):
 
     _built: ClassVar[dict[str, str]] = {}
 
+    edv_change_interval_ml: list[float] | None = None
+    """Its interval."""
+    edv_change_ml: float | None = None
+    """Change of the end-diastolic volume from rest to stress."""
+    edv_change_verdict: str | None = None
+    """Whether it changed."""
+    ef_change_interval_points: list[float] | None = None
+    """Its interval."""
     ef_change_points: float | None = None
     """Change from rest to stress, points."""
+    ef_change_verdict: str | None = None
+    """Whether it changed."""
+    esv_change_interval_ml: list[float] | None = None
+    """Its interval."""
+    esv_change_ml: float | None = None
+    """Change of the end-systolic volume."""
+    esv_change_verdict: str | None = None
+    """Whether it changed."""
     rest_edv_ml: float
     """End-diastolic volume at rest."""
     rest_ef_percent: float | None = None
@@ -248,8 +264,12 @@ class ComparedSegment(Document):
     """Share of its compared area that is reversible."""
     stress_percent: float | None = None
     """At stress, scaled to rest; `null` where nothing can be compared, as for the others."""
+    motion_change_interval_mm: list[float] | None = None
+    """Interval of that change: in nine of ten pairs such intervals hold all 17 changes together."""
     motion_change_mm: float | None = None
     """Change of motion from rest to stress, mm; `null` unless both scans are gated."""
+    motion_change_verdict: str | None = None
+    """Whether the motion changed."""
     name: str
     """Its name."""
     rest_score: int | None = None
@@ -258,8 +278,12 @@ class ComparedSegment(Document):
     """Its number, 1 to 17."""
     stress_score: int | None = None
     """Score at stress, 0 to 4."""
+    thickening_change_interval_points: list[float] | None = None
+    """Its interval, likewise."""
     thickening_change_points: float | None = None
     """Change of thickening from rest to stress, points."""
+    thickening_change_verdict: str | None = None
+    """Whether the thickening changed."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
