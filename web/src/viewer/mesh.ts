@@ -3,6 +3,9 @@
 import type { Plane } from "./plane";
 import { type Vec, add, cross, dot, mix, norm, scale, sub, unit } from "./vector";
 
+/** Shares of the corners of a triangle. */
+type Weights = [number, number, number];
+
 export interface Mesh {
   vertices: Vec[];
   triangles: [number, number, number][];
@@ -122,8 +125,7 @@ export function apart(mesh: Mesh, other: Mesh): Float32Array {
     let [best, sign] = [Infinity, 1];
     for (const corners of other.triangles) {
       const [p, q, r] = corners.map(at => other.vertices[at]!) as [Vec, Vec, Vec];
-      const near = nearest(vertex, p, q, r);
-      const away = sub(vertex, near);
+      const away = sub(vertex, weighted([p, q, r], nearest(vertex, p, q, r)));
       const distance = norm(away);
       if (distance < best) {
         best = distance;
@@ -134,24 +136,41 @@ export function apart(mesh: Mesh, other: Mesh): Float32Array {
   });
 }
 
-/** The point of a triangle that is nearest to `x` (Ericson, Real-Time Collision Detection, 5.1.5). */
-function nearest(x: Vec, a: Vec, b: Vec, c: Vec): Vec {
+/** The triangle of a mesh that is nearest to a place, and the place there; null where `accepts` takes none. */
+export function nearestOn(
+  mesh: Pick<Mesh, "vertices" | "triangles">,
+  place: Vec,
+  accepts: (triangle: number) => boolean,
+): { triangle: number; weights: Weights; place: Vec } | null {
+  let [best, found] = [Infinity, null as ReturnType<typeof nearestOn>];
+  for (let triangle = 0; triangle < mesh.triangles.length; triangle++) {
+    if (!accepts(triangle)) continue;
+    const corners = mesh.triangles[triangle]!.map(at => mesh.vertices[at]!) as [Vec, Vec, Vec];
+    const weights = nearest(place, ...corners);
+    const near = weighted(corners, weights);
+    const distance = norm(sub(place, near));
+    if (distance < best) [best, found] = [distance, { triangle, weights, place: near }];
+  }
+  return found;
+}
+
+export const weighted = ([a, b, c]: [Vec, Vec, Vec], [u, v, w]: Weights): Vec =>
+  add(scale(a, u), add(scale(b, v), scale(c, w)));
+
+/** The place of a triangle that is nearest to `x` (Ericson, Real-Time Collision Detection, 5.1.5). */
+function nearest(x: Vec, a: Vec, b: Vec, c: Vec): Weights {
   const [ab, ac, ap] = [sub(b, a), sub(c, a), sub(x, a)];
-  const at = (v: number, w: number): Vec => [
-    a[0] + ab[0] * v + ac[0] * w,
-    a[1] + ab[1] * v + ac[1] * w,
-    a[2] + ab[2] * v + ac[2] * w,
-  ];
+  const at = (v: number, w: number): Weights => [1 - v - w, v, w];
   const [d1, d2] = [dot(ab, ap), dot(ac, ap)];
-  if (d1 <= 0 && d2 <= 0) return a;
+  if (d1 <= 0 && d2 <= 0) return at(0, 0);
   const bp = sub(x, b);
   const [d3, d4] = [dot(ab, bp), dot(ac, bp)];
-  if (d3 >= 0 && d4 <= d3) return b;
+  if (d3 >= 0 && d4 <= d3) return at(1, 0);
   const vc = d1 * d4 - d3 * d2;
   if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d1 / (d1 - d3), 0);
   const cp = sub(x, c);
   const [d5, d6] = [dot(ab, cp), dot(ac, cp)];
-  if (d6 >= 0 && d5 <= d6) return c;
+  if (d6 >= 0 && d5 <= d6) return at(0, 1);
   const vb = d5 * d2 - d1 * d6;
   if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(0, d2 / (d2 - d6));
   const va = d3 * d6 - d5 * d4;
