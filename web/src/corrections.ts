@@ -5,8 +5,11 @@ import { resultsOf } from "./library";
 import type { Role } from "./pairing";
 import { isBeat, isFit } from "./words";
 
+/** The corrections that beats have as well: their gates follow the image, not a contour that was pulled. */
+export const BEAT_CORRECTIONS = ["center", "axis", "base", "segments_from"];
+
 /** The parameters of a fit that a comparison keeps of a corrected one, under the name of the scan's role. */
-export const CORRECTIONS = ["center", "axis", "base", "segments_from"];
+export const CORRECTIONS = [...BEAT_CORRECTIONS, "inner_through", "outer_through"];
 
 export const correctionName = (role: Role, name: string): string => `${role}_${name}`;
 

@@ -1,6 +1,7 @@
 // How results are called, so that those of one scan are told apart.
 
 import type { Result } from "./api";
+import { CORRECTIONS } from "./corrections";
 import { models, templates } from "./library";
 import { cut, exactMoment, isBeat, isComparison, isFit, isSerial, moment } from "./words";
 
@@ -16,7 +17,7 @@ function modelName(id: string): string {
 /** What distinguishes a result from others of the same scan. */
 export function resultName(result: Result): string {
   if (isFit(result.id) || isBeat(result.id)) {
-    const changed = ["center", "axis", "base", "roll", "segments_from"].filter(
+    const changed = [...CORRECTIONS, "roll"].filter(
       name => result.parameters[name] != null && result.parameters[name] !== 0,
     );
     const model = result.parameters["model"];

@@ -2,7 +2,7 @@
 // walls of single gates and their maps are those of a beat of each scan, fitted in the same way.
 
 import type { ParameterValue, Result, Volume } from "../api";
-import { CORRECTIONS, correctionName } from "../corrections";
+import { BEAT_CORRECTIONS, correctionName } from "../corrections";
 import type { BeatChange, ComparisonReport } from "../generated/openapi";
 import { resultsOf } from "../library";
 import { draftOf, parameterSpecs, valuesOf } from "../parameters";
@@ -36,7 +36,7 @@ export function isSameBeat(
 export function beatOf(made: Result, beat: BeatChange, scan: WhichScan, volume: string): Result | null {
   const all = resultsOf(volume).filter(result => isBeat(result.id));
   const corrected = (result: Result) =>
-    CORRECTIONS.every(
+    BEAT_CORRECTIONS.every(
       name =>
         JSON.stringify(made.parameters[correctionName(scan, name)] ?? null) ===
         JSON.stringify(result.parameters[name] ?? null),
@@ -56,7 +56,7 @@ export async function fitBeats(
     if (beats[scan]) continue;
     const { normals: _, ...own } = valuesOf(draftOf(made.parameters, specs), specs);
     const parameters: Record<string, ParameterValue> = { ...own, kept_model: report[scan].template };
-    for (const name of CORRECTIONS) {
+    for (const name of BEAT_CORRECTIONS) {
       const value = made.parameters[correctionName(scan, name)];
       if (value != null) parameters[name] = value;
     }

@@ -2,17 +2,19 @@
 // again from there.
 
 import { useEffect, useState } from "preact/hooks";
-import { type Parameters, type Result, type Volume, fieldOf, words } from "../api";
+import { type Result, type Volume, fieldOf, words } from "../api";
 import { CORRECTIONS, correctionName } from "../corrections";
 import { draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { openComparison } from "../route";
 import { useWatched } from "../state";
 import { fileComparison } from "../work";
-import type { Compared, ComparedHeart, WhichScan } from "./compared";
+import type { Compared, WhichScan } from "./compared";
 import type { OfBoth } from "./comparedgates";
-import type { ComparedScene } from "./comparedscene";
-import { Changed, EditFields, correctionOf } from "./correction";
+import type { ComparedEdit, ComparedScene } from "./comparedscene";
+import { Changed, EditFields, Pulls, correctionOf, whyNotPulled } from "./correction";
+import { frameOf } from "./plane";
 import { WallFrame } from "./polar";
+import { fittedPulls, repeatedPulls } from "./pulls";
 import type { Edit } from "./scene";
 import type { Triple } from "./shown";
 import { mix } from "./vector";
@@ -20,7 +22,14 @@ import { mix } from "./vector";
 /** Share of the way from base to apex at which the centre stands where nobody has put it. */
 const CENTRE_SHARE = 0.45;
 
-const NAMES: Record<string, string> = { center: "centre", axis: "axis", base: "base", segments_from: "turn" };
+const NAMES: Record<string, string> = {
+  center: "centre",
+  axis: "axis",
+  base: "base",
+  segments_from: "turn",
+  inner_through: "inner contour",
+  outer_through: "outer contour",
+};
 
 /** What was corrected of a scan before it was compared, in words; nothing where nothing was. */
 export function correctedWords({ parameters }: Pick<Result, "parameters">, scan: WhichScan): string {
@@ -29,13 +38,28 @@ export function correctedWords({ parameters }: Pick<Result, "parameters">, scan:
     .join(", ");
 }
 
+const otherScan = (scan: WhichScan): WhichScan => (scan === "stress" ? "rest" : "stress");
+
 /** The heart as it was fitted; null where it has no axis. */
-function startOf({ mesh, heart, scan }: ComparedHeart, parameters: Parameters): Edit | null {
+function startOf({ result, report, ...hearts }: Compared, scan: WhichScan): Edit | null {
+  const { mesh, heart } = hearts[scan];
   if (!heart) return null;
   // The plane of the base is that of the rim, as the service counts it.
   const { base } = new WallFrame(mesh, heart, 1, 1);
-  const center = parameters[correctionName(scan, "center")] as Triple | null | undefined;
-  return { base, apex: heart.apex, center: center ?? mix(base, heart.apex, CENTRE_SHARE), roll: 0, changed: new Set() };
+  const { apex } = heart;
+  const own = (name: string) => result.parameters[correctionName(scan, name)];
+  const fitted = fittedPulls(own("inner_through"), own("outer_through"));
+  return {
+    base,
+    apex,
+    center: (own("center") as Triple | null | undefined) ?? mix(base, apex, CENTRE_SHARE),
+    roll: 0,
+    // The gates of a beat follow the image.
+    wall: { mesh, base, apex, pulled: !report.beat && !whyNotPulled(result.parameters) },
+    pulls: fitted,
+    fitted,
+    changed: new Set(),
+  };
 }
 
 interface Props {
@@ -46,12 +70,13 @@ interface Props {
 
 /** What was corrected of a scan, and the button that puts handles on its slices. */
 export function CorrectScan({ compared, scene, scan }: Omit<Props, "scans"> & { scan: WhichScan }) {
-  const edited = useWatched(scene.edit)?.scan === scan;
+  const now = useWatched(scene.edit);
+  const edited = now?.scan === scan;
   const corrected = correctedWords(compared.result, scan);
   const start = () => {
-    const edit = startOf(compared[scan], compared.result.parameters);
+    const edit = now?.other ?? startOf(compared, scan);
     scene.valve.value = null;
-    scene.edit.value = edited || !edit ? null : { scan, edit };
+    scene.edit.value = edited || !edit ? null : { scan, edit, other: now?.edit.changed.size ? now.edit : null };
   };
   return (
     <>
@@ -81,16 +106,26 @@ export function ComparedCorrection({ compared, scene, scans }: Props) {
   }, [scene, now?.scan]);
   useEffect(() => () => void (scene.edit.value = scene.valve.value = null), [scene]);
   if (!now) return null;
-  const { scan, edit } = now;
+  const { scan, edit, other } = now;
   const { result, report } = compared;
+  const beside = otherScan(scan);
+  const nothing = edit.changed.size === 0 && !other?.changed.size;
   const send = async () => {
     setProblem(null);
     setSending(true);
     try {
       const specs = (await parameterSpecs()).comparison;
       const { normals, ...parameters } = valuesOf(draftOf(result.parameters, specs), specs);
-      const moved = correctionOf(edit, compared[scan].heart);
-      for (const [name, value] of Object.entries(moved)) parameters[correctionName(scan, name)] = value;
+      for (const [which, one] of [
+        [scan, edit],
+        [beside, other],
+      ] as const) {
+        const moved = one ? correctionOf(one, compared[which].heart) : {};
+        for (const [name, value] of Object.entries(moved)) {
+          if (value) parameters[correctionName(which, name)] = value;
+          else delete parameters[correctionName(which, name)];
+        }
+      }
       // Another heart may win from another place; the one that was looked at is kept.
       parameters["kept_model"] = report[scan].template;
       const job = await fileComparison({
@@ -109,8 +144,10 @@ export function ComparedCorrection({ compared, scene, scans }: Props) {
     <div class="panel correction" role="group" aria-label={`Correct ${scan} by hand`}>
       <p class="quiet">
         Drag <b>centre</b> (green), <b>apex</b> and <b>base</b> (yellow) in the long-axis slices at {scan}, and{" "}
-        <b>turn</b> (pink) in the short axis so that it points to the anterior wall: turning only renames segments. The
-        blue line shows where the wall goes before it is fitted again.
+        <b>turn</b> (pink) in the short axis so that it points to the anterior wall: turning only renames segments.{" "}
+        {edit.wall?.pulled && "Drag the contour to pull the wall’s inner or outer side where it should pass. "}
+        {!report.beat && whyNotPulled(result.parameters)} The blue line shows where the wall goes before it is fitted
+        again.
       </p>
       <button
         type="button"
@@ -128,29 +165,59 @@ export function ComparedCorrection({ compared, scene, scans }: Props) {
       )}
       <EditFields
         edit={edit}
-        onEdit={next => (scene.edit.value = { scan, edit: next })}
+        onEdit={next => (scene.edit.value = { ...now, edit: next })}
         wrong={problem?.field ?? null}
       />
+      <Pulls edit={edit} onEdit={next => (scene.edit.value = { ...now, edit: next })} wrong={problem?.field ?? null} />
+      {edit.pulls.length > 0 && <Repeat compared={compared} scene={scene} now={now} />}
+      {other && other.pulls.length > 0 && (
+        <section aria-label={`Pulls at ${beside}`}>
+          <p class="quiet">At {beside}:</p>
+          <Pulls edit={other} onEdit={next => (scene.edit.value = { ...now, other: next })} wrong={null} />
+        </section>
+      )}
       {problem && (
         <p class="error" role="alert">
           {problem.text}
         </p>
       )}
       <div class="buttons">
-        <button type="button" class="main" disabled={sending || edit.changed.size === 0} onClick={() => void send()}>
+        <button type="button" class="main" disabled={sending || nothing} onClick={() => void send()}>
           Fit and compare again
         </button>
         <button
           type="button"
           class="plain"
           onClick={() => {
-            const first = startOf(compared[scan], result.parameters);
-            if (first) scene.edit.value = { scan, edit: first };
+            const first = startOf(compared, scan);
+            if (first) scene.edit.value = { scan, edit: first, other: null };
           }}>
           Undo changes
         </button>
       </div>
       <Changed edit={edit} />
+      {other && other.changed.size > 0 && (
+        <p class="quiet">
+          Changed at {beside}: {[...other.changed].join(", ")}
+        </p>
+      )}
     </div>
+  );
+}
+
+/** Takes the pulls of the corrected scan to the same places of the other heart. */
+function Repeat({ compared, scene, now }: Pick<Props, "compared" | "scene"> & { now: ComparedEdit }) {
+  const beside = otherScan(now.scan);
+  const [own, heart] = [compared[now.scan].heart, compared[beside].heart];
+  const other = now.other ?? startOf(compared, beside);
+  if (!own || !heart || !other?.wall?.pulled) return null;
+  const next = repeatedPulls(now.edit.pulls, frameOf(own), other, frameOf(heart));
+  return (
+    <button
+      type="button"
+      disabled={next.pulls.length === other.pulls.length}
+      onClick={() => (scene.edit.value = { ...now, other: next })}>
+      Repeat on the scan at {beside}
+    </button>
   );
 }

@@ -17,6 +17,14 @@ export type Written = PolarLabels | "scores";
 /** What counts as 100 per cent in the slices. */
 export type Normalisation = "wall" | "image" | "slice";
 
+/** A correction of one heart that has not been sent. */
+export interface ComparedEdit {
+  scan: WhichScan;
+  edit: Edit;
+  /** What goes to the other heart with it; null where nothing was changed there. */
+  other: Edit | null;
+}
+
 export class ComparedScene extends Beating {
   /** Colours of the uptake in slices, polar maps and walls. */
   readonly lut = new Watched<Lut>(kept(WALL_LUT, UPTAKE) ?? LUTS[UPTAKE]!);
@@ -40,7 +48,7 @@ export class ComparedScene extends Beating {
   /** The stored beats of both scans that belong to the comparison. */
   readonly beats = new Watched<OfBoth<Loaded | null>>({ stress: null, rest: null });
   /** The heart that somebody corrects, as far as it was moved. */
-  readonly edit = new Watched<{ scan: WhichScan; edit: Edit } | null>(null);
+  readonly edit = new Watched<ComparedEdit | null>(null);
   /** Whether the valve plane is being put through two points, and the first of them with the kind of its slice. */
   readonly valve = new Watched<{ first: { kind: number; place: Vec } | null } | null>(null);
   readonly written = new Watched<Written>("means");

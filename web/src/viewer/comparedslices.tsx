@@ -15,11 +15,12 @@ import {
 } from "./compared";
 import { type ShownHeart, heartAt } from "./comparedgates";
 import type { ComparedScene } from "./comparedscene";
-import { type Look, drawHandles, label, outlineOf, paintVoxels, strokeOutline } from "./drawing";
-import { type Handle, dragged, handleAt, movedMesh } from "./handles";
+import { type Look, PREVIEW, drawHandles, drawPulls, label, outlineOf, paintVoxels, strokeOutline } from "./drawing";
+import { type Held, dragged, draggedTo, heldAt, isOnlyPressed, previewOf } from "./handles";
 import type { Mesh } from "./mesh";
 import { type Axis, type Plane, point } from "./plane";
-import { WallFrame, placeOnMap, onMap } from "./polar";
+import { placeOnMap, onMap } from "./polar";
+import { NEAR_SLICE } from "./pulls";
 import type { Edit } from "./scene";
 import { type Vec, dot, mix, norm, sub } from "./vector";
 
@@ -167,21 +168,8 @@ function markSlices(
   context.strokeRect(left + number * cell + 1, top(kind, 0) + 1, cell - 2, 2 * cell - 2);
 }
 
-/** The colour of what a correction shows before it is fitted. */
-const PREVIEW = { colour: "#5cc8ff" };
 /** Cells of at least so many CSS pixels have room for the names of handles. */
 const NAMED_CELL = 190;
-
-const moved = new WeakMap<Edit, Mesh>();
-
-/** The wall of a heart where somebody has moved it to; null where nothing was moved. */
-function preview(one: ComparedHeart, edit: Edit): Mesh | null {
-  if (!one.heart || !["center", "axis", "base"].some(name => edit.changed.has(name as "center"))) return null;
-  const { base } = new WallFrame(one.mesh, one.heart, 1, 1);
-  const found = moved.get(edit) ?? movedMesh(one.mesh, { ...edit, base, apex: one.heart.apex }, edit);
-  moved.set(edit, found);
-  return found;
-}
 
 /** The slice of a row that is nearest to a place: that with the handles. */
 function nearestSlice(
@@ -197,22 +185,42 @@ function nearestSlice(
   return away.indexOf(Math.min(...away));
 }
 
-/** Handles and preview of a correction on the rows of its scan. */
+/** Millimetres from a slice within which a pull is shown in it: each in one slice of a row at least. */
+const nearOf = (heart: Axis, kind: number, scene: ComparedScene) =>
+  Math.max(NEAR_SLICE, spacingOf(heart, kind, scene.rows.value) / 2);
+
+/** Handles and preview of a correction on the rows of its scan, and what goes to the other scan with it. */
 function markCorrection(
   context: CanvasRenderingContext2D,
   compared: Compared,
   scene: ComparedScene,
-  { cell, left, top }: Pick<Laid, "cell" | "left" | "top">,
+  laid: Pick<Laid, "cell" | "left" | "top">,
   factor: number,
 ): void {
   const now = scene.edit.value;
-  const one = now && compared[now.scan];
-  if (!now || !one?.heart) return;
+  if (!now) return;
+  markEdit(context, compared[now.scan], now.edit, scene, laid, factor, true);
+  if (now.other) markEdit(context, compared[now.scan === "stress" ? "rest" : "stress"], now.other, scene, laid, factor);
+}
+
+function markEdit(
+  context: CanvasRenderingContext2D,
+  one: ComparedHeart,
+  edit: Edit,
+  scene: ComparedScene,
+  { cell, left, top }: Pick<Laid, "cell" | "left" | "top">,
+  factor: number,
+  handles = false,
+): void {
+  if (!one.heart) return;
   const heart = { heart: one.heart, scan: one.scan };
   const rows = scene.rows.value;
-  const wall = preview(one, now.edit);
+  const wall = previewOf(edit);
+  // What can be pulled is seen.
+  const still = handles && edit.wall?.pulled && !scene.contours.value ? edit.wall.mesh : null;
   for (const kind of KINDS.keys()) {
-    const held = nearestSlice(heart, kind, rows, now.edit.center);
+    const held = nearestSlice(heart, kind, rows, edit.center);
+    const near = nearOf(one.heart, kind, scene);
     for (let n = 0; n < rows[kind]!.count; n++) {
       const { plane, origin } = sliceAt(heart, kind, n, rows);
       const flat = (place: Vec): [number, number] => {
@@ -225,9 +233,12 @@ function markCorrection(
       context.clip();
       context.translate(left + (n + 0.5) * cell, top(kind, one.scan === "stress" ? 0 : 1) + cell / 2);
       if (wall) strokeOutline(context, contourOf(wall, plane, origin), factor, PREVIEW);
+      else if (still) strokeOutline(context, contourOf(still, plane, origin), factor, WALL);
       const first = scene.valve.value?.first;
-      if (first?.kind === kind) ring(context, ...flat(first.place), 3);
-      if (n === held) drawHandles(context, now.edit, plane, flat, { knows: one.oriented, names: cell >= NAMED_CELL });
+      if (handles && first?.kind === kind) ring(context, ...flat(first.place), 3);
+      if (handles && n === held)
+        drawHandles(context, edit, plane, flat, { knows: one.oriented, names: cell >= NAMED_CELL });
+      drawPulls(context, edit, plane, origin, flat, near, cell >= NAMED_CELL ? 6 : 4);
       context.restore();
     }
   }
@@ -295,8 +306,8 @@ function hitOf(
   return null;
 }
 
-/** CSS pixels from a handle within which a press takes it. */
-const REACH = 14;
+/** CSS pixels from a handle within which a press takes it, and from the contour: of a finger as from a handle. */
+const [HANDLE_REACH, CONTOUR_REACH] = [14, 6];
 
 /** The slice under a pointer, and the place there. */
 function placeOfHit(
@@ -308,14 +319,28 @@ function placeOfHit(
   return { plane, place: point(plane, origin, right, down) };
 }
 
-/** What a press does to a correction: it takes a handle, or places a point of the valve plane. */
-function correct(scene: ComparedScene, hit: Hit, reach: number): Handle | "placed" | null {
+/** What of a correction a press would take; `mm` are those of a CSS pixel. */
+function heldBy(scene: ComparedScene, hit: Hit, mm: number, touch: boolean): Held | null {
+  const now = scene.edit.value;
+  const found = placeOfHit(scene, hit);
+  if (!now || !found || hit.one.scan !== now.scan || scene.valve.value) return null;
+  return heldAt(now.edit, found.plane, found.place, {
+    handle: HANDLE_REACH * mm,
+    contour: (touch ? HANDLE_REACH : CONTOUR_REACH) * mm,
+    near: nearOf(hit.one.heart!, hit.kind, scene),
+    knows: hit.one.oriented,
+    outlined: true,
+  });
+}
+
+/** What a press does to a correction: it takes a handle or the contour, or places a point of the valve plane. */
+function correct(scene: ComparedScene, hit: Hit, mm: number, touch: boolean): Held | "placed" | null {
   const now = scene.edit.value;
   const found = placeOfHit(scene, hit);
   if (!now || !found || hit.one.scan !== now.scan) return null;
   const { plane, place } = found;
   const valve = scene.valve.value;
-  if (!valve) return handleAt(now.edit, plane, place, reach, hit.one.oriented);
+  if (!valve) return heldBy(scene, hit, mm, touch);
   // In the short axis, the valve plane is no line.
   if (hit.kind === 0) return null;
   if (valve.first?.kind !== hit.kind) scene.valve.value = { first: { kind: hit.kind, place } };
@@ -326,10 +351,10 @@ function correct(scene: ComparedScene, hit: Hit, reach: number): Handle | "place
   return "placed";
 }
 
-function drag(scene: ComparedScene, handle: Handle, hit: Hit): void {
+function drag(scene: ComparedScene, held: Held, hit: Hit): void {
   const now = scene.edit.value;
   const found = placeOfHit(scene, hit);
-  if (now && found) scene.edit.value = { ...now, edit: dragged(now.edit, found.plane, handle, found.place) };
+  if (now && found) scene.edit.value = { ...now, edit: draggedTo(now.edit, found.plane, held, found.place) };
 }
 
 export function ComparedSlices({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
@@ -369,34 +394,45 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
     },
     compared,
   );
-  const held = useRef<{ handle: Handle; hit: Hit } | null>(null);
+  const held = useRef<{ took: Held; hit: Hit } | null>(null);
   const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
     const hit = hitOf(event, compared, scene);
     if (!hit) return;
     const mm = scene.across.value / laid(event.currentTarget.clientWidth, event.currentTarget.clientHeight, rows).cell;
-    const took = correct(scene, hit, REACH * mm);
+    const took = correct(scene, hit, mm, event.pointerType === "touch");
     if (took) {
       event.currentTarget.setPointerCapture(event.pointerId);
-      held.current = took === "placed" ? null : { handle: took, hit };
+      held.current = took === "placed" ? null : { took, hit };
       return;
     }
+    choose(hit);
+  };
+  const choose = (hit: Hit) => {
     scene.chosen.value = { kind: hit.kind, number: hit.number };
     scene.cursor.value = onWall(scene, hit.one, hit, hit.right, hit.down) ?? scene.cursor.value;
   };
+  const release = () => {
+    const edit = scene.edit.value?.edit;
+    if (held.current && edit && isOnlyPressed(held.current.took, edit)) choose(held.current.hit);
+    held.current = null;
+  };
   const pointTo = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
     if (held.current) {
-      const { handle, hit } = held.current;
+      const { took, hit } = held.current;
       const { clientWidth: width, clientHeight: height } = event.currentTarget;
       const { cell, left, top } = laid(width, height, rows);
       const mm = scene.across.value / cell;
       const row = hit.one.scan === "stress" ? 0 : 1;
       const right = (event.offsetX - left - (hit.number + 0.5) * cell) * mm;
       const down = (event.offsetY - top(hit.kind, row) - cell / 2) * mm;
-      drag(scene, handle, { ...hit, right, down });
+      drag(scene, took, { ...hit, right, down });
       return;
     }
     if (event.pointerType === "touch") return;
     const hit = hitOf(event, compared, scene);
+    const { clientWidth: width, clientHeight: height } = event.currentTarget;
+    const takes = hit && heldBy(scene, hit, scene.across.value / laid(width, height, rows).cell, false);
+    event.currentTarget.style.cursor = takes ? "grab" : "";
     scene.pointed.value = hit && onWall(scene, hit.one, hit, hit.right, hit.down, NEAR_WALL);
   };
   const move = (along: number, over: number) => {
@@ -416,7 +452,7 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
       aria-valuenow={rows.slice(0, kind).reduce((sum, row) => sum + row.count, 0) + number + 1}
       aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${rows[kind]!.count}`}
       onPointerDown={press}
-      onPointerUp={() => (held.current = null)}
+      onPointerUp={release}
       onPointerCancel={() => (held.current = null)}
       onPointerMove={pointTo}
       onPointerLeave={() => (scene.pointed.value = null)}

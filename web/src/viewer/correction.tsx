@@ -1,15 +1,17 @@
 // Putting the heart where it is: by handles in the slices or by numbers, then a new fit from there.
 
 import { useLayoutEffect, useState } from "preact/hooks";
-import { type ParameterValue, type Volume, fieldOf, words } from "../api";
+import { type ParameterValue, type Parameters, type Volume, fieldOf, words } from "../api";
 import { ReaderChoice, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { useWatched } from "../state";
-import { isGated, kindOf } from "../words";
+import { isFit, isGated, kindOf } from "../words";
 import { file } from "../work";
 import type { Loaded } from "./loaded";
+import { previewOf } from "./handles";
 import { type Axis, frameOf } from "./plane";
 import { WallFrame } from "./polar";
-import type { Edit, Scene } from "./scene";
+import { fittedPulls, pullTo, pullWords, throughOf, withPulls } from "./pulls";
+import type { Edit, Pull, Scene } from "./scene";
 import type { Triple } from "./shown";
 import { type Vec, add, dot, scale, sub, turned, unit } from "./vector";
 
@@ -29,7 +31,18 @@ function start(scene: Scene, shown: Loaded | null): Edit {
     const center = (shown.report?.localisation?.centre as Triple | undefined) ?? shown.middle;
     // The plane of the base is that of the rim, as the service counts it.
     const { base } = new WallFrame(shown.mesh, heart, 1, 1);
-    return { base, apex: heart.apex, center, roll: 0, changed: new Set() };
+    const { parameters, id } = shown.result;
+    const fitted = isFit(id) ? fittedPulls(parameters["inner_through"], parameters["outer_through"]) : [];
+    return {
+      base,
+      apex: heart.apex,
+      center,
+      roll: 0,
+      wall: { mesh: shown.mesh, base, apex: heart.apex, pulled: isFit(id) && !whyNotPulled(parameters) },
+      pulls: fitted,
+      fitted,
+      changed: new Set(),
+    };
   }
   const center = scene.cursor.value;
   return {
@@ -37,8 +50,17 @@ function start(scene: Scene, shown: Loaded | null): Edit {
     base: sub(center, scale(USUAL, HALF_LENGTH)),
     apex: add(center, scale(USUAL, HALF_LENGTH)),
     roll: 0,
+    wall: null,
+    pulls: [],
+    fitted: [],
     changed: new Set(["center"]),
   };
+}
+
+/** Why the contour of a wall made with these parameters cannot be pulled; nothing where it can. */
+export function whyNotPulled({ edge, reader }: Parameters): string {
+  if (edge === "anatomical") return "The contour can be pulled where the apparent wall is shown.";
+  return reader ? "The contour can be pulled where no reader’s profile draws it." : "";
 }
 
 export function Correction({ scene, volume, shown }: Props) {
@@ -70,7 +92,10 @@ export function Correction({ scene, volume, shown }: Props) {
       const kept = corrected?.report?.template ?? corrected?.beat?.report.template;
       if (kept) next["kept_model"] = kept;
       const moved = correctionOf(edit, scene.heart.value);
-      Object.assign(next, moved);
+      for (const [name, value] of Object.entries(moved)) {
+        if (value) next[name] = value;
+        else delete next[name];
+      }
       if (moved.center) {
         delete next["seed_point"];
         delete next["box"];
@@ -96,6 +121,9 @@ export function Correction({ scene, volume, shown }: Props) {
         <p class="quiet">
           Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so
           that it points to the anterior wall: turning only renames segments.{" "}
+          {edit.wall?.pulled &&
+            "Drag the contour to pull the wall’s inner or outer side where it should pass: the new fit goes through there. "}
+          {corrected && kind === "segmentation" && whyNotPulled(corrected.result.parameters)}{" "}
           {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.
         </p>
       ) : (
@@ -108,6 +136,13 @@ export function Correction({ scene, volume, shown }: Props) {
         edit={edit}
         onEdit={next => (scene.edit.value = next)}
         cursor={cursor}
+        wrong={problem?.field ?? null}
+      />
+      <Pulls
+        edit={edit}
+        onEdit={next => (scene.edit.value = next)}
+        cursor={cursor}
+        onShow={({ place }) => (scene.cursor.value = place)}
         wrong={problem?.field ?? null}
       />
       {kind === "segmentation" && (
@@ -229,6 +264,57 @@ export function EditFields({ edit, onEdit, cursor, wrong }: FieldsProps) {
   );
 }
 
+interface PullsProps extends FieldsProps {
+  /** Takes the views to a pull. */
+  onShow?: (pull: Pull) => void;
+}
+
+/** Where the contour was pulled: each is taken back by itself. */
+export function Pulls({ edit, onEdit, cursor, onShow, wrong }: PullsProps) {
+  const toCursor = cursor && edit.wall?.pulled && pullTo(edit, previewOf(edit) ?? edit.wall.mesh, cursor);
+  return (
+    <>
+      {toCursor && (
+        <button type="button" onClick={() => onEdit(withPulls(edit, [...edit.pulls, toCursor]))}>
+          Pull the {toCursor.outer ? "outer" : "inner"} contour to the cursor
+        </button>
+      )}
+      {edit.pulls.length > 0 && (
+        <ul class="pulls" aria-label="Pulls of the contour">
+          {edit.pulls.map((pull, n) => {
+            const name = `${n + 1}: ${pullWords(pull, edit)}`;
+            const refused = wrong === (pull.outer ? "outer_through" : "inner_through");
+            return (
+              <li key={n} class={refused ? "wrong" : ""}>
+                <span>{name}</span>
+                {onShow && (
+                  <button type="button" class="plain" aria-label={`Show pull ${name}`} onClick={() => onShow(pull)}>
+                    Show
+                  </button>
+                )}
+                <button
+                  type="button"
+                  class="plain"
+                  aria-label={`Remove pull ${name}`}
+                  onClick={() =>
+                    onEdit(
+                      withPulls(
+                        edit,
+                        edit.pulls.filter((_, at) => at !== n),
+                      ),
+                    )
+                  }>
+                  Remove
+                </button>
+              </li>
+            );
+          })}
+        </ul>
+      )}
+    </>
+  );
+}
+
 /** What was changed so far. */
 export function Changed({ edit }: { edit: Edit }) {
   return (
@@ -240,9 +326,9 @@ export function Changed({ edit }: { edit: Edit }) {
 
 const rounded = (value: Vec, digits: number) => value.map(part => Math.round(part * 10 ** digits) / 10 ** digits);
 
-/** What the service is told of a correction: of what was changed, the parameters. */
-export function correctionOf(edit: Edit, heart: Axis | null): Partial<Record<Correctable, number[]>> {
-  const moved: Partial<Record<Correctable, number[]>> = {};
+/** What the service is told of a correction: of what was changed, the parameters; null for those that it has no more. */
+export function correctionOf(edit: Edit, heart: Axis | null): Partial<Record<Correctable, number[] | null>> {
+  const moved: Partial<Record<Correctable, number[] | null>> = {};
   if (edit.changed.has("center")) moved.center = rounded(edit.center, 2);
   if (edit.changed.has("axis")) moved.axis = rounded(unit(sub(edit.apex, edit.base)), 4);
   if (edit.changed.has("base")) moved.base = rounded(edit.base, 2);
@@ -251,10 +337,14 @@ export function correctionOf(edit: Edit, heart: Axis | null): Partial<Record<Cor
     const { axis, anterior } = frameOf(heart);
     moved.segments_from = rounded(turned(anterior, axis, (edit.roll * Math.PI) / 180), 4);
   }
+  if (edit.changed.has("contour")) {
+    moved.inner_through = throughOf(edit, false);
+    moved.outer_through = throughOf(edit, true);
+  }
   return moved;
 }
 
-type Correctable = "center" | "axis" | "base" | "segments_from";
+type Correctable = "center" | "axis" | "base" | "segments_from" | "inner_through" | "outer_through";
 
 interface TripleFieldProps {
   name: string;

@@ -4,8 +4,9 @@ import { counts } from "../words";
 import type { Lut } from "./colours";
 import { type Mesh, outline } from "./mesh";
 import { smooth as smoothSurface } from "./smooth";
-import { rollKnob } from "./handles";
+import { previewOf, rollKnob } from "./handles";
 import { type Plane, letters, point } from "./plane";
+import { NEAR_SLICE } from "./pulls";
 import type { Edit, Layer, Scene } from "./scene";
 import { type Vec, add, dot, scale, sub, unit } from "./vector";
 import type { Voxels } from "./volume";
@@ -288,8 +289,13 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
     }
     context.stroke();
   }
-  if (style.cursor && scene.edit.value && scene.tool.value === "correct")
-    drawHandles(context, scene.edit.value, plane, flat, { knows: scene.heart.value !== null, names: true });
+  const edit = style.cursor && scene.tool.value === "correct" ? scene.edit.value : null;
+  if (edit) {
+    const wall = previewOf(edit);
+    if (wall) strokeOutline(context, outlineOf(wall, plane, origin), factor, PREVIEW);
+    drawHandles(context, edit, plane, flat, { knows: scene.heart.value !== null, names: true });
+    drawPulls(context, edit, plane, origin, flat, NEAR_SLICE, 6);
+  }
   context.restore();
   if (!style.letters) return;
   const [left, right, top, bottom] = plane.sides ?? [
@@ -325,6 +331,40 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
   context.lineWidth = 2;
   context.stroke();
   label(context, `${length} mm`, from, y - 11, "left", 11);
+}
+
+/** The colour of what a correction shows before it is fitted. */
+export const PREVIEW = { colour: "#5cc8ff" };
+
+/** Draws the pulls of the contour that are near a slice: diamonds, unlike the round handles. */
+export function drawPulls(
+  context: CanvasRenderingContext2D,
+  edit: Edit,
+  plane: Plane,
+  origin: Vec,
+  flat: (place: Vec) => [number, number],
+  near: number,
+  radius: number,
+): void {
+  for (const { place } of edit.pulls) {
+    if (Math.abs(dot(sub(place, origin), plane.normal)) > near) continue;
+    const [x, y] = flat(place);
+    context.beginPath();
+    context.moveTo(x, y - radius);
+    context.lineTo(x + radius, y);
+    context.lineTo(x, y + radius);
+    context.lineTo(x - radius, y);
+    context.closePath();
+    context.lineJoin = "round";
+    context.lineWidth = 5;
+    context.strokeStyle = "#000";
+    context.stroke();
+    context.lineWidth = 1.5;
+    context.strokeStyle = "#fff";
+    context.stroke();
+    context.fillStyle = PREVIEW.colour;
+    context.fill();
+  }
 }
 
 /** Half the length of the line that stands for the plane of the base, mm. */

@@ -28,14 +28,37 @@ export interface Window {
 
 export type Tool = "cursor" | "window" | "move" | "correct";
 
+/** A place to which somebody has pulled the contour. */
+export interface Pull {
+  /** Whether the outer surface of the wall passes through it, or the inner one. */
+  outer: boolean;
+  place: Vec;
+  /** The place of the fitted surface that was pulled there. */
+  from: Vec;
+}
+
+/** The wall that is corrected, as it was fitted, with the ends of its axis. */
+export interface EditedWall {
+  mesh: Mesh;
+  base: Vec;
+  apex: Vec;
+  /** Whether its contour can be pulled. */
+  pulled: boolean;
+}
+
 /** A correction that has not been sent: where a person put the heart. */
 export interface Edit {
   base: Vec;
   apex: Vec;
   center: Vec;
   roll: number;
-  /** Which of them were changed by hand. */
-  changed: Set<"center" | "axis" | "base" | "roll">;
+  /** Null where nothing was fitted. */
+  wall: EditedWall | null;
+  pulls: Pull[];
+  /** The pulls that the wall was fitted with. */
+  fitted: Pull[];
+  /** What was changed by hand. */
+  changed: Set<"center" | "axis" | "base" | "roll" | "contour">;
 }
 
 export interface Difference {

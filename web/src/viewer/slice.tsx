@@ -4,9 +4,10 @@ import { useEffect, useRef } from "preact/hooks";
 import { useCanvas } from "./canvas";
 import { type SliceStyle, drawSlice, sliceOrigin } from "./drawing";
 import { handleEvents } from "./events";
-import { type Handle, dragged, handleAt } from "./handles";
+import { type Held, draggedTo, heldAt, isOnlyPressed } from "./handles";
 import { type Plane, letters, point } from "./plane";
 import { counts } from "../words";
+import { NEAR_SLICE } from "./pulls";
 import type { Scene } from "./scene";
 import { type Vec, add, dot, scale } from "./vector";
 
@@ -65,9 +66,12 @@ function describe(element: HTMLCanvasElement, scene: Scene, plane: Plane): void 
 
 const STEP_OF_WHEEL = 40;
 
+/** CSS pixels from a handle within which a press takes it, and from the contour: of a finger as from a handle. */
+const [HANDLE_REACH, CONTOUR_REACH] = [14, 6];
+
 function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): () => void {
   const pointers = new Map<number, PointerEvent>();
-  let handle: Handle | null = null;
+  let held: Held | null = null;
   let rest = 0;
 
   /** The place under a position on the screen. */
@@ -113,12 +117,21 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
     element.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, event);
     if (pointers.size > 1) return;
+    held = heldBy(event);
+    if (held) element.style.cursor = "grabbing";
+    if (!held && kind(event) === "cursor") scene.cursor.value = placeAt(event);
+  };
+  /** What of a correction a press would take. */
+  const heldBy = (event: PointerEvent): Held | null => {
     const edit = scene.edit.value;
-    handle =
-      edit && scene.tool.value === "correct"
-        ? handleAt(edit, plane(), placeAt(event), 14 / factor(), scene.heart.value !== null)
-        : null;
-    if (!handle && kind(event) === "cursor") scene.cursor.value = placeAt(event);
+    if (!edit || scene.tool.value !== "correct") return null;
+    return heldAt(edit, plane(), placeAt(event), {
+      handle: HANDLE_REACH / factor(),
+      contour: (event.pointerType === "touch" ? HANDLE_REACH : CONTOUR_REACH) / factor(),
+      near: NEAR_SLICE,
+      knows: scene.heart.value !== null,
+      outlined: scene.layers.value.some(layer => layer.shown && layer.mesh === edit.wall?.mesh),
+    });
   };
   const kind = (event: PointerEvent) => {
     if (event.buttons === 2 || event.shiftKey) return "window";
@@ -127,7 +140,10 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
   };
   const move = (event: PointerEvent) => {
     const before = pointers.get(event.pointerId);
-    if (!before) return;
+    if (!before) {
+      element.style.cursor = heldBy(event) ? "grab" : "";
+      return;
+    }
     const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
     if (pointers.size === 2) {
       const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
@@ -136,8 +152,7 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
         zoom(span(before) / span(event));
         pan(dx / 2, dy / 2);
       }
-    } else if (handle)
-      scene.edit.value = scene.edit.value && dragged(scene.edit.value, plane(), handle, placeAt(event));
+    } else if (held) scene.edit.value = scene.edit.value && draggedTo(scene.edit.value, plane(), held, placeAt(event));
     else if (kind(event) === "window") window_(dx, dy);
     else if (kind(event) === "move") pan(dx, dy);
     else scene.cursor.value = placeAt(event);
@@ -145,8 +160,11 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
   };
   const up = (event: PointerEvent) => {
     pointers.delete(event.pointerId);
-    if (handle) scene.edit.value = scene.edit.value && { ...scene.edit.value };
-    handle = null;
+    const edit = scene.edit.value;
+    if (held && edit && isOnlyPressed(held, edit)) scene.cursor.value = placeAt(event);
+    else if (held) scene.edit.value = edit && { ...edit };
+    held = null;
+    element.style.cursor = "";
   };
   const wheel = (event: WheelEvent) => {
     event.preventDefault();
