@@ -16,6 +16,7 @@ import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
 import { examples } from "./examples.mjs";
 import { gated, gatedNm, heartless, nm, pair, series, small } from "./nm.mjs";
+import { pulls } from "./pull.mjs";
 import { readings } from "./reading.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 import { serials } from "./serial.mjs";
@@ -673,6 +674,7 @@ async function main() {
 
   const tools = { PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose };
   await examples(tools);
+  await pulls(tools);
   await comparisons(tools);
   await studies(tools);
   await serials(tools);
