@@ -32,8 +32,9 @@ pub const MOST_THROUGH_MM: f64 = 40.0;
 /// Stiffness of a hold relative to all sensors together.
 pub(super) const HOLD_STIFFNESS: f64 = 0.3;
 
-/// Distance from a point at which sensors see the edge by 40 % of their weight, mm: about a wall's thickness.
-const MUTED_RADIUS_MM: f64 = 9.0;
+/// Distance from a point at which sensors see the edge by 40 % of their weight, mm: more than an edge of a model of 150
+/// points, so that the wall bulges instead of rising to a tip.
+const MUTED_RADIUS_MM: f64 = 14.0;
 
 /// The place of the model that a point holds.
 #[derive(Debug, Clone, Copy)]
