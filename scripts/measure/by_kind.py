@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every figure, interval and flag by kind of scan: what holds on scans that no constant has seen, and where it does not.
+"""Every figure, interval and flag by kind of scan: what holds on scans that no constant has seen, and what does not.
 
     by_kind.py CASES                  makes what is missing of the scans and tables in CASES, and prints the tables of
                                       docs/kinds.md
@@ -44,9 +44,7 @@ HELD_OUT = {
 }
 HELD_OUT_BEATS = {"17500": ("gated", 17500, 16, []), "17103": ("walls", 17103, 8, ["--gates", "8"])}
 HELD_OUT_PAIRS = {"17610": ("pairs", 17610, 20, ["--gates", "0"])}
-HELD_OUT_GATED_PAIRS = {
-    "17620": ("pairs", 17620, 8, ["--gates", "8", "--kinds", calibrate_all.KINDS_OF_GATED_PAIRS])
-}
+HELD_OUT_GATED_PAIRS = {"17620": ("pairs", 17620, 8, ["--gates", "8", "--kinds", calibrate_all.KINDS_OF_GATED_PAIRS])}
 IN_SAMPLE = ["6003", "6007"]
 GOOD, BAD, ELSEWHERE_MM = 0.75, 0.65, 25.0
 
@@ -139,7 +137,8 @@ def single_scans(judged, measured):
             told.append(f"{spread(errors)} ({held_share})" if spread(errors) else "")
         lines.append(
             f"| {kind} | {len(group)} | {len(group) - len(found)} | {elsewhere or ''} | {best} | "
-            f"{sum(map(is_right, group))} | {sure} | {sum(bool(flags_of(row)) for row in found)} | {told[0]} | {told[1]} |"
+            f"{sum(map(is_right, group))} | {sure} | {sum(bool(flags_of(row)) for row in found)} | {told[0]} | "
+            f"{told[1]} |"
         )
     return lines
 
@@ -253,7 +252,8 @@ def page(lab, only, real):
         lines += ["", f"## {title} by kind", "", "Held-out.", "", *told(own)]
         lines += ["", "In-sample:", "", *told(rows_of(ROOT / f"scripts/measure/calibration/{program}.csv"))]
     halves = rows_of(ROOT / "scripts/measure/calibration/halves.csv")
-    lines += ["", "Real, halves of one patient's scan, in which nothing changed (in-sample):", "", *pairs_by_kind(halves)]
+    lines += ["", "Real, halves of one patient's scan, in which nothing changed (in-sample):", ""]
+    lines += pairs_by_kind(halves)
     orders = HELD_OUT_GATED_PAIRS
     studies = [case for item in orders.items() for case in sorted(lab.made(*item).iterdir()) if case.is_dir()]
     own = rows_of(lab.table("beat_changes", orders, studies))

@@ -4,9 +4,9 @@
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
     calibrate_comparison.py --check-beats TABLE
                                             figures of a table of changes of the beat
-    calibrate_comparison.py --write         estimates the constants from comparisons.csv, halves.csv and beat_changes.csv
-                                            of scripts/measure/calibration, and writes calibration.rs and
-                                            beat_calibration.rs of crates/ventriform/src/heart/comparison
+    calibrate_comparison.py --write         estimates the constants from comparisons.csv, halves.csv and
+                                            beat_changes.csv of scripts/measure/calibration, and writes calibration.rs
+                                            and beat_calibration.rs of crates/ventriform/src/heart/comparison
 
 A table is what the program `comparisons` prints; calibrate_all.py makes that of the pairs. By itself:
 
