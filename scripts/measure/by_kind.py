@@ -77,10 +77,11 @@ def number(row, name):
 
 
 def kind_of(row):
-    """The kind in a case's name: `hotgut17001_014` is of the kind hotgut; a variant is a kind of its own."""
+    """The kind in a case's name: `hotgut17001_014` is of the kind hotgut, `lvh_A` the variant lvh of the heart A."""
     if row["set"] == "variants":
-        return row["case"]
-    return re.sub(r"\d+_\d+$", "", row["case"]).strip("_")
+        return f"variant {row['case'].rsplit('_', 1)[0]}"
+    kind = re.sub(r"\d+_\d+$", "", row["case"]).strip("_")
+    return "walls" if kind == "w" else kind
 
 
 def flags_of(row):
