@@ -2987,7 +2987,7 @@ export interface components {
              * @default 0.02
              */
             fit_peak_weight?: number;
-            /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, from 600 points on 8, from 2000 on 5; for paper: 0) */
+            /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, from 600 points on 8; for paper: 0) */
             fit_rounds?: number;
             /**
              * @description Samples of the surface per triangle of the model in the fit; fewer, at least 6, where the surface's own triangles are larger

@@ -111,11 +111,7 @@ impl ModelParameters {
 /// The most rounds of the fit by default, for a model of `points` points: many points lie close to the surface after
 /// few rounds.
 fn most_fit_rounds(points: usize) -> usize {
-    match points {
-        0..600 => usize::MAX,
-        600..2000 => 8,
-        _ => 5,
-    }
+    if points < 600 { usize::MAX } else { 8 }
 }
 
 /// Points of all starts together at the default number of starts.

@@ -285,7 +285,7 @@ pub const MODEL_SPECS: &[ParameterSpec<ModelParameters>] = &[
         groups::FIT,
         "",
         "Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: \
-         10, from 600 points on 8, from 2000 on 5; for paper: 0)"
+         10, from 600 points on 8; for paper: 0)"
     ),
     number!(
         "fit_shape_weight",
