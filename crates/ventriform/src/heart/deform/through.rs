@@ -86,9 +86,10 @@ pub(super) fn holds(mesh: &TriMesh, sides: &EdgeShift, points: &[ThroughPoint]) 
 
 /// Takes their weight from the sensors about the points, on the side of each.
 pub(super) fn mute(readings: &mut [SensorReading], sides: &EdgeShift, points: &[ThroughPoint]) {
-    for reading in readings {
-        let (side, _) = sides.at(&reading.place, &reading.normal);
-        for point in points {
+    // Hardly any fit has points: the side of each of thousands of sensors is only asked for where there are some.
+    for point in points {
+        for reading in &mut *readings {
+            let (side, _) = sides.at(&reading.place, &reading.normal);
             if (side == WallSide::Outer) == point.outer {
                 let away = (reading.place - point.place).norm() / MUTED_RADIUS_MM;
                 reading.weight *= 1.0 - (-0.5 * away * away).exp();
