@@ -51,10 +51,8 @@ pub(in crate::heart) const fn by_share(
     error: ChangeError,
 ) -> ChangingFigure {
     ChangingFigure {
-        place,
         by_share: true,
-        matters,
-        error,
+        ..by_difference(place, matters, error)
     }
 }
 

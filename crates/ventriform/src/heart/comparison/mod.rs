@@ -11,7 +11,6 @@
 //!    (`border.rs`); wall below the threshold of the rest map in both is fixed.
 //! 5. Draws of correlated noise give each share and each score an interval and a verdict ([`Answers`],
 //!    [`ScoreAnswers`]).
-//!
 //! 6. Changes of the beat, where both scans are gated, have the errors of hearts whose beat did not change
 //!    (`beat_change.rs`).
 //!

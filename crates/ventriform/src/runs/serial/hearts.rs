@@ -1,8 +1,7 @@
 //! The hearts of a serial comparison.
 
 use crate::heart::beat::SegmentMotion;
-use crate::heart::comparison::FigureChange;
-use crate::heart::comparison::{Answer, Change, ScoreAnswers};
+use crate::heart::comparison::{Answer, Change, FigureChange, ScoreAnswers};
 use crate::heart::serial::{Registration, SERIAL_FIGURES, SerialFlag};
 use crate::image::volume::Provenance;
 use crate::parameters::{FitParameters, SerialChoice};
