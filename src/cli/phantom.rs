@@ -12,7 +12,9 @@ use ventriform::image::volume::nifti::{self, StoredType};
 use ventriform::image::volume::phantom::{
     PerfusionDefect, PhantomBeat, PhantomParameters, healthy_person, phantom, phantom_gates,
 };
-use ventriform::runs::examples::{SIMULATED_NOTE, simulated_projections, simulated_slices};
+use ventriform::runs::examples::{
+    DEFECTS_OF_A_PAIR, SIMULATED_NOTE, simulated_projections, simulated_slices,
+};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]
@@ -161,17 +163,6 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     }
     Ok(())
 }
-
-/// The defects at stress if none are given: the wall that the left anterior descending artery supplies.
-const DEFECTS_OF_A_PAIR: [PerfusionDefect; 4] = {
-    const fn of(segment: u8) -> PerfusionDefect {
-        PerfusionDefect {
-            segment,
-            severity: 0.6,
-        }
-    }
-    [of(7), of(8), of(13), of(14)]
-};
 
 /// Writes the scan of these parameters to a folder; the names of its files.
 fn scan(

@@ -20,6 +20,18 @@ use crate::results::export::dicom::{
 /// What the files say of where they come from.
 pub const SIMULATED_NOTE: &str = "simulated, not patients";
 
+/// What the wall lacks at stress in a pair for which nothing else is said: the territory of the left anterior descending
+/// artery.
+pub const DEFECTS_OF_A_PAIR: [PerfusionDefect; 4] = [defect(7), defect(8), defect(13), defect(14)];
+
+/// A defect that leaves two fifths of the uptake.
+const fn defect(segment: u8) -> PerfusionDefect {
+    PerfusionDefect {
+        segment,
+        severity: 0.6,
+    }
+}
+
 /// A simulated scan that needs no parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Example {
@@ -71,13 +83,6 @@ impl Example {
     /// # Errors
     /// [`ExampleError`]; none is known for the parameters that these examples have.
     pub fn file(self, monitor: &Monitor) -> Result<Vec<u8>, ExampleError> {
-        let defects = |segments: &[u8], severity: f64| {
-            let of = |segment: &u8| PerfusionDefect {
-                segment: *segment,
-                severity,
-            };
-            segments.iter().map(of).collect::<Vec<_>>()
-        };
         let usual = PhantomParameters {
             shape: [64, 64, 44],
             spacing_mm: [6.4; 3],
@@ -87,7 +92,7 @@ impl Example {
         let (parameters, beat) = match self {
             Self::Scan => (
                 PhantomParameters {
-                    defects: defects(&[4, 10, 15], 0.6),
+                    defects: [4, 10, 15].map(defect).to_vec(),
                     seed: 21,
                     ..usual
                 },
@@ -96,7 +101,7 @@ impl Example {
             Self::Gated => (PhantomParameters { seed: 22, ..usual }, Some(beat)),
             Self::Stress => (
                 PhantomParameters {
-                    defects: defects(&[7, 8, 13, 14], 0.6),
+                    defects: DEFECTS_OF_A_PAIR.to_vec(),
                     seed: 23,
                     ..usual
                 },
