@@ -12,27 +12,19 @@
 use anyhow::{Result, anyhow};
 use serde_json::Value;
 use std::path::Path;
-use ventriform::base::progress::Monitor;
 use ventriform::heart::beat::{Beat, SegmentMotion};
 use ventriform::heart::comparison::Answer;
 use ventriform::heart::comparison::beat_change::{
     EDV, EF, ESV, SEGMENT_MOTION, SEGMENT_THICKENING, answer, segment_answer,
 };
-use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::ComparisonParameters;
-use ventriform::runs::rest_stress::{ComparisonOrder, from_files};
+use ventriform_evaluation::{compared, print_table};
 
-fn main() -> Result<()> {
-    println!(
-        "series,kind,figure,earlier,later,true_earlier,true_later,noise_points,change,low,high,verdict"
+fn main() {
+    print_table(
+        "series,kind,figure,earlier,later,true_earlier,true_later,noise_points,change,low,high,verdict",
+        rows,
     );
-    for folder in std::env::args().skip(1) {
-        match rows(Path::new(&folder)) {
-            Ok(rows) => rows.iter().for_each(|row| println!("{row}")),
-            Err(error) => eprintln!("{folder} is left out: {error:#}"),
-        }
-    }
-    Ok(())
 }
 
 fn read(path: &Path) -> Result<Value> {
@@ -45,20 +37,9 @@ fn rows(folder: &Path) -> Result<Vec<String>> {
     let truth: [Result<Value>; 2] = ["rest", "stress"].map(truth);
     let [rest_truth, stress_truth] = truth;
     let truth = [rest_truth?, stress_truth?];
-    let files = |scan: &str| vec![VolumeFile::at(folder.join(scan).join("gated.nii.gz"))];
-    let (stress, rest) = (files("stress"), files("rest"));
     let mut parameters = ComparisonParameters::default();
     parameters.choice.gated = true;
-    let order = ComparisonOrder {
-        stress: &stress,
-        rest: &rest,
-        auto: true,
-        models: Vec::new(),
-        normals: None,
-        parameters: &parameters,
-    };
-    let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())
-        .map_err(|error| anyhow!("{error}"))?;
+    let made = compared(folder, "gated.nii.gz", &parameters)?;
     let beats = made.rest.beat().zip(made.stress.beat());
     let (rest, stress) = beats.ok_or_else(|| anyhow!("there are no beats"))?;
     let beats = [&rest.beat, &stress.beat];

@@ -9,45 +9,26 @@
 //! the anatomical wall and of the wall as it looks, that of the muscle, the deviation of the difference over the wall,
 //! the reversible share, the territory that has most of it, and flags.
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use serde_json::Value;
 use std::ops::Range;
 use std::path::Path;
-use ventriform::base::progress::Monitor;
 use ventriform::heart::polar::{RAY_COLUMNS, RAY_ROWS};
-use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::ComparisonParameters;
-use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
+use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts};
+use ventriform_evaluation::{compared, print_table};
 
-fn main() -> Result<()> {
-    println!(
+fn main() {
+    print_table(
         "pair,kind,comparable,true_tid,tid,tid_apparent,muscle,resolution_stress,resolution_rest,turn,turn_gain,correlation,matched,\
-         sd_points,smooth_points,fine_points,noise_points,sd_apical,sd_middle,sd_basal,largest_sds,detectable,reversible,reversible_low,reversible_high,true_reversible,territory,true_territory,fixed,verdict,flags"
+         sd_points,smooth_points,fine_points,noise_points,sd_apical,sd_middle,sd_basal,largest_sds,detectable,reversible,reversible_low,reversible_high,true_reversible,territory,true_territory,fixed,verdict,flags",
+        |folder| Ok(vec![row(folder)?]),
     );
-    for folder in std::env::args().skip(1) {
-        match row(Path::new(&folder)) {
-            Ok(row) => println!("{row}"),
-            Err(error) => eprintln!("{folder} is left out: {error:#}"),
-        }
-    }
-    Ok(())
 }
 
 fn row(folder: &Path) -> Result<String> {
     let truth: Value = serde_json::from_slice(&std::fs::read(folder.join("pair.json"))?)?;
-    let files = |scan: &str| vec![VolumeFile::at(folder.join(scan).join("spect.nii.gz"))];
-    let (stress, rest) = (files("stress"), files("rest"));
-    let parameters = ComparisonParameters::default();
-    let order = ComparisonOrder {
-        stress: &stress,
-        rest: &rest,
-        auto: true,
-        models: Vec::new(),
-        normals: None,
-        parameters: &parameters,
-    };
-    let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())
-        .map_err(|error| anyhow!("{error}"))?;
+    let made = compared(folder, "spect.nii.gz", &ComparisonParameters::default())?;
     let change = &made.change;
     let answer = change.answers.reversible;
     let apparent = |heart: &ComparedHeart| {

@@ -17,18 +17,13 @@ use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::SerialParameters;
 use ventriform::results::report::SerialReport;
 use ventriform::runs::serial::{SerialOrder, from_files};
+use ventriform_evaluation::print_table;
 
-fn main() -> Result<()> {
-    println!(
-        "series,kind,figure,earlier,later,true_earlier,true_later,noise_points,change,low,high,verdict,moved_mm,turned_degrees,correlation,flags"
+fn main() {
+    print_table(
+        "series,kind,figure,earlier,later,true_earlier,true_later,noise_points,change,low,high,verdict,moved_mm,turned_degrees,correlation,flags",
+        rows,
     );
-    for folder in std::env::args().skip(1) {
-        match rows(Path::new(&folder)) {
-            Ok(rows) => rows.iter().for_each(|row| println!("{row}")),
-            Err(error) => eprintln!("{folder} is left out: {error:#}"),
-        }
-    }
-    Ok(())
 }
 
 fn files_of(folder: &Path) -> Vec<VolumeFile> {
