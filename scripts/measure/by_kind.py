@@ -17,16 +17,17 @@ a heart (kind `none`) is right if it is refused.
 
 import argparse
 import collections
-import csv
 import pathlib
 import re
 import statistics
 
 import calibrate_all
-import calibrate_intervals
 import calibrate_serial
+import flag_rates
 import numpy as np
 from calibrate_comparison import BEAT_NAMES
+from calibrate_intervals import HALF_WIDTH_SDS, in_deviations, rows_of
+from flag_rates import GOOD, flags_of, good_and_bad, grouped, is_elsewhere, number
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/kinds.md"
@@ -46,7 +47,6 @@ HELD_OUT_BEATS = {"17500": ("gated", 17500, 16, []), "17103": ("walls", 17103, 8
 HELD_OUT_PAIRS = {"17610": ("pairs", 17610, 20, ["--gates", "0"])}
 HELD_OUT_GATED_PAIRS = {"17620": ("pairs", 17620, 8, ["--gates", "8", "--kinds", calibrate_all.KINDS_OF_GATED_PAIRS])}
 IN_SAMPLE = ["6003", "6007"]
-GOOD, BAD, ELSEWHERE_MM = 0.75, 0.65, 25.0
 
 
 class Lab(calibrate_all.Lab):
@@ -67,32 +67,12 @@ class Lab(calibrate_all.Lab):
         return path
 
 
-def rows_of(path):
-    lines = [line for line in open(path, newline="") if line.count(",") > 5]
-    return list(csv.DictReader(lines))
-
-
-def number(row, name):
-    return float(row[name]) if row[name] else None
-
-
 def kind_of(row):
     """The kind in a case's name: `hotgut17001_014` is of the kind hotgut, `lvh_A` the variant lvh of the heart A."""
     if row["set"] == "variants":
         return f"variant {row['case'].rsplit('_', 1)[0]}"
-    kind = re.sub(r"\d+_\d+$", "", row["case"]).strip("_")
+    kind = flag_rates.kind_of(row)
     return "walls" if kind == "w" else kind
-
-
-def flags_of(row):
-    return set(row["flags"].replace("+", " ").split())
-
-
-def grouped(rows, of):
-    groups = collections.defaultdict(list)
-    for row in rows:
-        groups[of(row)].append(row)
-    return groups
 
 
 def share(part, whole):
@@ -111,8 +91,7 @@ def is_right(row):
     """Whether a fit is good, or a scan without a heart is refused."""
     if kind_of(row).startswith("none"):
         return row["result"] == "refused"
-    jaccard = number(row, "jaccard")
-    return row["result"] == "found" and jaccard is not None and jaccard >= GOOD
+    return row["result"] == "found" and (number(row, "jaccard") or 0) >= GOOD
 
 
 def single_scans(judged, measured):
@@ -126,7 +105,7 @@ def single_scans(judged, measured):
     ]
     for kind, group in sorted(grouped(judged, kind_of).items()):
         found = [row for row in group if row["result"] == "found"]
-        elsewhere = sum((number(row, "off_mm") or 0) > ELSEWHERE_MM for row in found)
+        elsewhere = sum(map(is_elsewhere, found))
         jaccards = sorted(number(row, "jaccard") for row in found if row["jaccard"])
         best = f"{statistics.median(jaccards):.2f}, {jaccards[0]:.2f}" if jaccards else ""
         sure = f"{statistics.median(number(row, 'confidence') for row in found):.2f}" if found else ""
@@ -146,22 +125,13 @@ def single_scans(judged, measured):
 
 def intervals(measured):
     """Of each row whether the intervals of wall and cavity hold the true ones."""
-    terms = calibrate_intervals.committed("volumes")
-    held = []
-    for constant, (error, causes) in calibrate_intervals.errors_of("volumes", measured)[0].items():
-        off = np.abs(error - terms[constant][0]) / calibrate_intervals.deviation(terms[constant], causes)
-        held.append(off < calibrate_intervals.HALF_WIDTH_SDS)
-    return held
+    return [off < HALF_WIDTH_SDS for _, off in in_deviations("volumes", measured).values()]
 
 
-def flag_rates(sets):
+def rates_of_flags(sets):
     """A row of each flag: its rate on good and on bad fits of each set."""
     heads = [f"{name}: {which}" for name in sets for which in ("good", "bad")]
-    parts = []
-    for judged in sets.values():
-        found = [row for row in judged if row["result"] == "found" and row["jaccard"]]
-        parts.append([row for row in found if number(row, "jaccard") >= GOOD])
-        parts.append([row for row in found if number(row, "jaccard") < BAD])
+    parts = [part for judged in sets.values() for part in good_and_bad(judged)]
     codes = sorted({code for part in parts for row in part for code in flags_of(row)})
     lines = ["| flag | " + " | ".join(heads) + " |", "|---" * (len(heads) + 1) + "|"]
     lines.append("| fits | " + " | ".join(str(len(part)) for part in parts) + " |")
@@ -174,17 +144,15 @@ def flag_rates(sets):
 
 
 def beats_by_kind(rows):
-    terms = calibrate_intervals.committed("beats")
-    errors, _ = calibrate_intervals.errors_of("beats", rows)
+    figures = in_deviations("beats", rows)
     lines = ["| kind | studies | EF, points (held) | EDV, % (held) | ESV, % (held) |", "|---|---|---|---|---|"]
-    kinds = np.array([re.sub(r"[_\d]+$", "", re.sub(r"\d+_\d+$", "", row["study"])).strip("_") for row in rows])
+    kinds = np.array([re.sub(r"[_\d]+$", "", row["study"]) for row in rows])
     for kind in [*sorted(set(kinds)), "all"]:
         own = kinds == kind if kind != "all" else np.ones(len(kinds), bool)
         cells = []
-        for constant, (error, causes) in errors.items():
-            off = np.abs(error - terms[constant][0]) / calibrate_intervals.deviation(terms[constant], causes)
-            held = share((off[own] < calibrate_intervals.HALF_WIDTH_SDS).sum(), own.sum())
-            scale = 0.01 if constant.startswith("EF") or "EJECTION" in constant else 1
+        for constant, (error, off) in figures.items():
+            held = share((off[own] < HALF_WIDTH_SDS).sum(), own.sum())
+            scale = 0.01 if constant.startswith("EF") else 1
             cells.append(f"{spread(scale * error[own])} ({held})" if own.sum() > 1 else "")
         lines.append(f"| {kind} | {own.sum()} | " + " | ".join(cells) + " |")
     return lines
@@ -216,15 +184,10 @@ def pairs_by_kind(rows):
 def changes(rows, names):
     lines = ["| figure | pairs | error, rms | told of unchanged | interval holds |", "|---|---|---|---|---|"]
     for _, figure, what in names:
-        own = calibrate_serial.errors(rows, figure)
-        if not own:
-            continue
-        unchanged = [row for _, _, row in own if calibrate_serial.is_unchanged(row)]
-        told = sum(row["verdict"] == "yes" for row in unchanged)
-        true = [(float(row["change"]) - calibrate_serial.shift(row, error), row) for error, _, row in own]
-        held = sum(float(row["low"]) <= change <= float(row["high"]) for change, row in true)
-        size = calibrate_serial.root_mean_square(error for error, _, _ in own)
-        lines.append(f"| {what} | {len(own)} | {size:.3g} | {told} of {len(unchanged)} | {share(held, len(own))} |")
+        own, told, unchanged, held = calibrate_serial.judged(rows, figure)
+        if own:
+            size = calibrate_serial.root_mean_square(own)
+            lines.append(f"| {what} | {len(own)} | {size:.3g} | {told} of {unchanged} | {share(held, len(own))} |")
     return lines
 
 
@@ -243,7 +206,7 @@ def page(lab, only, real):
     if "in-sample" in sets:
         seen = rows_of(ROOT / "scripts/measure/calibration/volumes.csv")
         lines += ["", "In-sample:", "", *single_scans(sets["in-sample"], seen)]
-    lines += ["", "## Flags", "", "Rates on good and on bad fits.", "", *flag_rates(sets)]
+    lines += ["", "## Flags", "", "Rates on good and on bad fits.", "", *rates_of_flags(sets)]
     for title, orders, program, told in (
         ("Beats", HELD_OUT_BEATS, "beats", beats_by_kind),
         ("Stress and rest", HELD_OUT_PAIRS, "comparisons", pairs_by_kind),

@@ -61,16 +61,15 @@ FILES = {
 }
 
 
-def errors(name, table):
-    """-> error of each figure with its causes (size of the cavity, share of the wall that is dark, what one standard
-    deviation of the thickness makes of the figure), and the set of each row."""
+def rows_of(table):
+    """The rows of a table as `beats` and `volumes` print it, without what follows it."""
     with open(table, newline="") as file:
-        lines = [line for line in file if line.count(",") > 5]
-    return errors_of(name, list(csv.DictReader(lines)))
+        return list(csv.DictReader([line for line in file if line.count(",") > 5]))
 
 
 def errors_of(name, rows):
-    """The same of the rows of a table."""
+    """-> error of each figure with its causes (size of the cavity, share of the wall that is dark, what one standard
+    deviation of the thickness makes of the figure), and the set of each row."""
     _, _, _, cavity, figures = FILES[name]
 
     def column(name):
@@ -129,10 +128,17 @@ def committed(name):
     return terms
 
 
-def report(name, table):
+def in_deviations(name, rows):
+    """-> of each figure the errors of the rows, and their size in standard deviations by the committed constants."""
     terms = committed(name)
-    for constant, (error, causes) in errors(name, table)[0].items():
-        off = np.abs(error - terms[constant][0]) / deviation(terms[constant], causes)
+    return {
+        constant: (error, np.abs(error - terms[constant][0]) / deviation(terms[constant], causes))
+        for constant, (error, causes) in errors_of(name, rows)[0].items()
+    }
+
+
+def report(name, table):
+    for constant, (_, off) in in_deviations(name, rows_of(table)).items():
         print(
             f"{constant}: {np.mean(off < HALF_WIDTH_SDS):.0%} of {len(off)} within the interval of 90 %; standard "
             f"deviation of error over deviation {np.sqrt(np.mean(off**2)):.2f}"
@@ -141,7 +147,7 @@ def report(name, table):
 
 def write(name):
     path, head, method, _, figures = FILES[name]
-    of, sets = errors(name, TABLES / f"{name}.csv")
+    of, sets = errors_of(name, rows_of(TABLES / f"{name}.csv"))
     text = (
         f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse "
         f"crate::base::numeric::error_terms::ErrorTerms;\n"

@@ -112,22 +112,26 @@ def write():
     CONSTANTS.write_text(HEADER + constants(rows, NAMES))
 
 
+def judged(rows, figure):
+    """The errors of a figure; of how many pairs that did not change it is told that they did, and how many there are;
+    how many intervals hold the true change."""
+    own = errors(rows, figure)
+    unchanged = [row for _, _, row in own if is_unchanged(row)]
+    told = sum(row["verdict"] == "yes" for row in unchanged)
+    true_changes = [(number(row, "change") - shift(row, error), row) for error, _, row in own]
+    held = sum(number(row, "low") <= change <= number(row, "high") for change, row in true_changes)
+    return [error for error, _, _ in own], told, len(unchanged), held
+
+
 def check_figures(rows, names):
     """Prints of every figure the errors, and how often verdicts and intervals are right."""
     for _, figure, _ in names:
-        own = errors(rows, figure)
-        if not own:
-            continue
-        unchanged = [row for _, _, row in own if is_unchanged(row)]
-        told = sum(row["verdict"] == "yes" for row in unchanged)
-        true_changes = [(number(row, "change") - shift(row, error), row) for error, _, row in own]
-        held = sum(number(row, "low") <= change <= number(row, "high") for change, row in true_changes)
-        mean = sum(error for error, _, _ in own) / len(own)
-        size = root_mean_square(error for error, _, _ in own)
-        print(
-            f"{figure:24} {len(own):4}: error {mean:+.3f}, rms {size:.3f}; "
-            f"told changed {told} of {len(unchanged)} unchanged; interval holds the true change in {held} of {len(own)}"
-        )
+        own, told, unchanged, held = judged(rows, figure)
+        if own:
+            print(
+                f"{figure:24} {len(own):4}: error {sum(own) / len(own):+.3f}, rms {root_mean_square(own):.3f}; told "
+                f"changed {told} of {unchanged} unchanged; interval holds the true change in {held} of {len(own)}"
+            )
 
 
 def check(table):
