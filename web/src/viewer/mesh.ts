@@ -122,17 +122,11 @@ function crossing(start: Vec, way: Vec, p: Vec, q: Vec, r: Vec): number {
 /** Distance from every vertex to the nearest vertex plane of another mesh, with sign: positive outside it. */
 export function apart(mesh: Mesh, other: Mesh): Float32Array {
   return Float32Array.from(mesh.vertices, vertex => {
-    let [best, sign] = [Infinity, 1];
-    for (const corners of other.triangles) {
-      const [p, q, r] = corners.map(at => other.vertices[at]!) as [Vec, Vec, Vec];
-      const away = sub(vertex, weighted([p, q, r], nearest(vertex, p, q, r)));
-      const distance = norm(away);
-      if (distance < best) {
-        best = distance;
-        sign = dot(away, cross(sub(q, p), sub(r, p))) < 0 ? -1 : 1;
-      }
-    }
-    return sign * best;
+    const near = nearestOn(other, vertex, () => true);
+    if (!near) return Infinity;
+    const [p, q, r] = other.triangles[near.triangle]!.map(at => other.vertices[at]!) as [Vec, Vec, Vec];
+    const away = sub(vertex, near.place);
+    return dot(away, cross(sub(q, p), sub(r, p))) < 0 ? -norm(away) : norm(away);
   });
 }
 
